@@ -12,7 +12,7 @@
 use cpu_time::ThreadTime;
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::models::real::WorldParameters;
+use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::scenario::{Condition, Scenario, ScenarioBuilder};
 use haptic_sim::simulation::{Run, simulate};
 use haptic_sim::worlds::WORLDS;

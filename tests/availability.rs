@@ -1,10 +1,10 @@
 //! How often guidance leaves for nothing, in small: nothing on paper, and nothing where cameras blink.
 
-use haptic_batch::availability::{Plan, ROADS, study};
+use haptic_batch::availability::{AvailabilityPlan, ROADS, study};
 use haptic_sim::worlds::WORLDS;
 
 fn drive(world: &str, hours: f64) -> haptic_batch::availability::Availability {
-    let plan = Plan {
+    let plan = AvailabilityPlan {
         worlds: WORLDS.iter().filter(|kind| kind.name == world).collect(),
         roads: ROADS.iter().collect(),
         hours,

@@ -172,7 +172,7 @@ fn a_run_that_leaves_its_lane_for_good_is_flagged_and_finite() {
 #[test]
 fn a_road_that_cannot_be_followed_is_flagged() {
     // A radius of 10 m at 60 km/h asks for 28 m/s2.
-    let text = "[[segment]]\nlength = 50\n[[segment]]\nlength = 100\ncurvature = 0.1";
+    let text = "[[segment]]\nlength_m = 50\n[[segment]]\nlength_m = 100\ncurvature_per_m = 0.1";
     let course = Course::from_toml("hairpin", text).unwrap();
     assert!(run(&Scenario::builder().course(course).build().unwrap()).diverged());
 }

@@ -1,10 +1,10 @@
 //! Which experiment tells a driver: what `host-sim design` promises is held against drives that were identified.
 
-use haptic_batch::design::{Question, design};
+use haptic_batch::design::{DesignRequest, design};
 use haptic_sim::models::road::Course;
 
-fn question() -> Question {
-    Question {
+fn question() -> DesignRequest {
+    DesignRequest {
         participants: vec![2, 9],
         courses: vec![Course::paper()],
         frequencies_hz: vec![1.5, 2.5],
@@ -49,7 +49,7 @@ fn the_error_that_is_promised_is_the_one_that_comes() {
 
 #[test]
 fn what_cannot_be_asked_is_named() {
-    let of = |edit: fn(&mut Question)| {
+    let of = |edit: fn(&mut DesignRequest)| {
         let mut question = question();
         edit(&mut question);
         design(&question, || {}).unwrap_err().to_string()

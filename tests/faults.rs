@@ -44,7 +44,7 @@ fn no_rule_breaks_where_roads_and_cars_are_real_and_no_handover_is_worse_than_a_
     let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
     let failures = |name: &str, drivers: Drivers| {
         let world = WORLDS.iter().find(|world| world.name == name).unwrap();
-        let world = World::real(world).driven_by(drivers);
+        let world = World::of_kind(world).driven_by(drivers);
         campaign::run(&world, &here, 1..2, || ())
             .failures()
             .cloned()
@@ -72,7 +72,7 @@ fn a_vehicle_that_brakes_is_no_fault_and_hides_none() {
         "speed-falls-to-zero",
     ];
     let rows = rows.map(by_name);
-    let campaign = campaign::run(&World::real(world), &rows, 1..9, || ());
+    let campaign = campaign::run(&World::of_kind(world), &rows, 1..9, || ());
     let left: Vec<u64> = campaign.rows.iter().map(|row| row.left).collect();
     assert_eq!(left, [0, 0, 8, 8, 8]);
     let after_ms = |row: usize| campaign.rows[row].left_after_ms.expect("all left")[1];

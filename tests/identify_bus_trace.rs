@@ -9,20 +9,16 @@ use std::sync::LazyLock;
 use haptic_analysis::identify::{
     DriveLog, Options, Recording, SingleTrack, identify_with_noise_model, open_recording, open_recording_with,
 };
+use haptic_batch::identify::single_track;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::vehicle::VehicleParameters;
-use haptic_sim::scenario::{GuidanceParameters, Scenario, Speed};
+use haptic_sim::scenario::{Scenario, Speed};
 use haptic_sim::simulation::{self, Outcome};
 
 /// What candump would have written, and the driver's e_theta at each millisecond.
 static DRIVE: LazyLock<(String, Vec<f64>)> = LazyLock::new(|| record(&scenario()));
 
 fn scenario() -> Scenario {
-    let mut guidance = GuidanceParameters {
-        probe: true,
-        ..Default::default()
-    };
-    guidance.controller.probe_amplitude_nm = 0.2;
     let scenario = Scenario::builder()
         .driver(DriverParameters {
             t_p: 0.15,
@@ -31,7 +27,7 @@ fn scenario() -> Scenario {
         })
         .gains(ArmGains { k_d: 3.0, k_hg: 0.4 })
         .seed(5)
-        .guidance(guidance);
+        .guidance(crate::probing());
     scenario.build().unwrap()
 }
 
@@ -341,25 +337,7 @@ fn the_far_point_is_that_of_the_vehicle_that_was_given() {
     let directory = tempfile::tempdir().unwrap();
     let trace = directory.path().join("trace.log");
     std::fs::write(&trace, text).unwrap();
-    let VehicleParameters {
-        m,
-        i,
-        l_f,
-        l_r,
-        k_f,
-        k_r,
-        k_t,
-        ..
-    } = heavy;
-    let given = SingleTrack {
-        m,
-        i,
-        l_f,
-        l_r,
-        k_f,
-        k_r,
-        k_t,
-    };
+    let given = single_track(&scenario);
     let worst = |vehicle: Option<SingleTrack>| {
         let recording = Recording {
             vehicle,

@@ -1,9 +1,9 @@
 //! Drivers who change while they drive in closed loop: seen, when, and with what truth in the pieces.
 
-use haptic_batch::experiment::{ChangesLine, Plan, changes};
+use haptic_batch::experiment::{ChangesLine, ExperimentPlan, changes};
 
 fn line(participants: Vec<u32>, drives: u32, kind: &str) -> ChangesLine {
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants,
         probe_nm: 0.2,
         seed: 40,

@@ -2,21 +2,16 @@
 //! refuse, and whether its standard errors are right.
 
 use haptic_analysis::identify::{DriveLog, Identification, Options, Parameter, identify_with_noise_model};
-use haptic_batch::experiment::{Plan, Recorder, experiment, repeat};
+use haptic_batch::experiment::{ExperimentPlan, Recorder, experiment, repeat};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::participants::{PublishedDriver, participants};
-use haptic_sim::scenario::{GuidanceParameters, Scenario, Sensors};
+use haptic_sim::scenario::{Scenario, Sensors};
 use haptic_sim::simulation;
 use rayon::prelude::*;
 
 /// One guided drive with a probe, without remnant, logged exactly. Nobody moves the wheel for the ECU, which feels no hand at times:
 /// equation (8) has no such torque.
 fn identified_without_noise(driver: &PublishedDriver) -> Identification {
-    let mut guidance = GuidanceParameters {
-        probe: true,
-        ..Default::default()
-    };
-    guidance.controller.probe_amplitude_nm = 0.2;
     let scenario = Scenario::builder()
         .driver(DriverParameters {
             answers_hands_off_after_s: f64::INFINITY,
@@ -24,7 +19,7 @@ fn identified_without_noise(driver: &PublishedDriver) -> Identification {
         })
         .gains(driver.gains())
         .sensors(Sensors::Exact)
-        .guidance(guidance);
+        .guidance(crate::probing());
     let mut recorder = Recorder::new(false);
     simulation::observe(&scenario.build().unwrap(), |outcome| recorder.observe(outcome));
     identify_with_noise_model(&recorder.into_log(), &Options::default())
@@ -91,7 +86,7 @@ fn drivers_at_either_end_of_k_hg_are_identified() {
 /// all parameters hold the truth as often as they promise.
 #[test]
 fn with_a_probe_k_hg_is_read_and_the_intervals_hold_what_they_promise() {
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: (1..=14).collect(),
         probe_nm: 0.2,
         seed: 1,
@@ -109,7 +104,7 @@ fn with_a_probe_k_hg_is_read_and_the_intervals_hold_what_they_promise() {
 /// participant; the published way names a number and puts it on its bound for most. Its mean fit is the paper's.
 #[test]
 fn without_a_probe_k_hg_is_not_identified() {
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: (1..=14).collect(),
         probe_nm: 0.0,
         seed: 1,
@@ -149,18 +144,13 @@ fn without_a_probe_k_hg_is_not_identified() {
 #[test]
 fn a_drive_with_uneven_stamps_is_resampled_and_identified() {
     let driver = participants()[1].guided;
-    let mut guidance = GuidanceParameters {
-        probe: true,
-        ..Default::default()
-    };
-    guidance.controller.probe_amplitude_nm = 0.2;
     let scenario = Scenario::builder()
         .driver(DriverParameters {
             remnant_sd_nm: 0.07,
             ..driver.parameters()
         })
         .gains(driver.gains())
-        .guidance(guidance)
+        .guidance(crate::probing())
         .seed(4)
         .build()
         .unwrap();

@@ -5,10 +5,10 @@
 
 use std::sync::LazyLock;
 
-use haptic_batch::experiment::{CorruptionLine, Corruptions, Plan, corruptions};
+use haptic_batch::experiment::{CorruptionLine, Corruptions, ExperimentPlan, corruptions};
 
 static FOUND: LazyLock<Corruptions> = LazyLock::new(|| {
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: vec![2, 5, 9],
         probe_nm: 0.2,
         seed: 1,

@@ -370,8 +370,8 @@ const LONGEST: usize = 350;
 const LONGER: &[(&str, &str)] = &[
     ("host-sim/batch/src/adaptation/mod.rs", "one study: maps, slopes, loops, with the results of each"),
     ("host-sim/batch/src/compare/results.rs", "one document: what is said of laws, drivers and drives"),
+    ("host-sim/batch/src/experiment/mod.rs", "one study: its plan, and what is said of each participant"),
     ("host-sim/batch/src/compare/tests.rs", "every refusal of a file beside the others"),
-    ("host-sim/batch/src/study/tests.rs", "every refusal of a file beside the others"),
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
     ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
@@ -406,7 +406,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/campaign/src/invariants.rs", "every rule of a cycle beside the others"),
     ("host-sim/campaign/src/residual.rs", "the checks a second time, beside each other"),
     ("host-sim/campaign/src/trial.rs", "one run: what is drawn, driven and judged"),
-    ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
     ("host-sim/report/src/studies/identify.rs", "one report, section by section"),
     ("host-sim/vectorised/src/runs.rs", "one block of all runs, read from top to bottom"),
     ("host-sim/vectorised/src/ecu.rs", "one step of the lean ECU, read from top to bottom"),

@@ -26,3 +26,15 @@ mod resets;
 mod startup;
 mod track_changing_driver;
 mod unclipped;
+
+use haptic_sim::scenario::GuidanceParameters;
+
+/// The default guidance with a probe of 0.2 N.m.
+fn probing() -> GuidanceParameters {
+    let mut guidance = GuidanceParameters {
+        probe: true,
+        ..Default::default()
+    };
+    guidance.controller.probe_amplitude_nm = 0.2;
+    guidance
+}

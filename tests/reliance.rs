@@ -1,7 +1,7 @@
 //! The driver's reliance, read live by the ECU from its probe, against the truth of the driver model. (Whether the
 //! envelope clips the probe is `unclipped`'s question.)
 
-use haptic_batch::reliance::{Plan, Readings, study};
+use haptic_batch::reliance::{Readings, ReliancePlan, study};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::scenario::{GuidanceParameters, Scenario};
@@ -10,7 +10,7 @@ use haptic_sim::{Action, Simulation, simulation};
 /// 14 drivers x 2 seeds, four sessions each, against the required bounds. (`host-sim reliance` has 20 seeds.)
 #[test]
 fn all_participants_are_read_live() {
-    let plan = Plan {
+    let plan = ReliancePlan {
         participants: (1..=14).collect(),
         seeds: 2,
         amplitude_nm: 0.2,
@@ -60,7 +60,7 @@ fn the_probe_is_off_by_default() {
 #[test]
 fn another_arm_is_inside_the_stated_deviation() {
     for t_nms_s in [0.06, 0.15] {
-        let plan = Plan {
+        let plan = ReliancePlan {
             participants: (1..=14).collect(),
             seeds: 1,
             amplitude_nm: 0.2,

@@ -68,7 +68,7 @@ for name, work in (("Ecu.step", bare), ("Ecu.step with the frames of Bus", with_
     rate = STEPS / seconds(work)
     print(f"{name}: {rate:,.0f} steps/s from Python, {rate / in_rust:.2f} of the closed loop in Rust")
 
-straight = hg.Scenario(course={"segment": [{"length": 20_000.0}]})
+straight = hg.Scenario(course={"segment": [{"length_m": 20_000.0}]})
 env, hand = gymnasium.make("haptic_guidance/Driver-v0", scenario=straight), np.zeros(1, dtype=np.float32)
 action = hg.Action(hand_torque_nm=0.0)
 env.reset(seed=1)

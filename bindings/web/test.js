@@ -227,9 +227,9 @@ async function law() {
 
 async function files() {
   const wrong = async (name, text) => { await page.take(new File([text], name)); return $("wrong").textContent; };
-  const broken = await wrong("broken.xodr", "<OpenDRIVE><road id='1'>"), none = await wrong("hill.toml", "lane_width = 30\n[[segment]]\nlength = 400\n");
-  check("broken roads", broken.includes("broken.xodr") && none.includes("lane_width") && none.includes("30"), `${broken} / ${none}`);
-  await page.take(new File(["lane_width = 3.5\n[[segment]]\nlength = 100\n[[segment]]\nlength = 600\ncurvature = 0.003\n"], "mine.toml"));
+  const broken = await wrong("broken.xodr", "<OpenDRIVE><road id='1'>"), none = await wrong("hill.toml", "lane_width_m = 30\n[[segment]]\nlength_m = 400\n");
+  check("broken roads", broken.includes("broken.xodr") && none.includes("lane_width_m") && none.includes("30"), `${broken} / ${none}`);
+  await page.take(new File(["lane_width_m = 3.5\n[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 600\ncurvature_per_m = 0.003\n"], "mine.toml"));
   await pause(200);
   check("a road of one's own", page.state().course === "mine.toml" && page.live.road[4 * 100 + 3] === 0.003 && $("told").textContent.includes("0.7 km"), $("told").textContent);
   let fault = "";

@@ -586,3 +586,22 @@ fn the_dbc_file_has_a_bit_for_every_fault() {
         assert_eq!(bits, expected);
     }
 }
+
+/// To whole counts of 2^-12 N.m toward zero, so that no bound is crossed by rounding, and no more than 5 N.m.
+#[test]
+fn a_torque_is_cut_to_what_its_frame_carries() {
+    for (nm, counts) in [
+        (0.0, 0.0),
+        (0.9 / 4096.0, 0.0),
+        (1.0 / 4096.0, 1.0),
+        (2.99 / 4096.0, 2.0),
+        (5.0, 20_480.0),
+        (5.01, 20_480.0),
+        (128.0, 20_480.0),
+    ] {
+        for sign in [1.0, -1.0] {
+            let carried = Guidance::rounded(Torque::from_nm(sign * nm));
+            assert_eq!(carried.nm(), sign * counts / 4096.0, "{nm}");
+        }
+    }
+}

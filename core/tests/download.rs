@@ -10,6 +10,8 @@ use haptic_core::service::download::{
     Conditions, Download, UNLOCK_MS, frames, mode_for_parameters, unlock, value,
 };
 use haptic_core::service::stored::{Set, Stored};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
 
 /// Every value is a binary32, so that the bus rounds nothing.
 const SET: Params = Params {
@@ -449,4 +451,68 @@ fn a_wrong_unlock_locks() {
     assert_eq!(download.receive(&unlock(8, VEHICLE), &READY), None);
     assert_eq!(download.receive(&frames(&SET)[0], &READY), None);
     assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
+}
+
+/// What may come in any order, against the rules of docs/explanation/monitor-and-memory.md told a second time.
+#[test]
+fn whatever_comes_a_set_is_taken_only_as_the_rules_say() {
+    let rng = &mut SmallRng::seed_from_u64(1);
+    let [good, bad] = [SET, Params { k_1: 9.0, ..SET }].map(|params| frames(&params));
+    let mut download = Download::NEW;
+    // The field that comes next, none after a refusal; until when it is unlocked; the values of k_1 of this set.
+    let (mut next, mut until, mut is_bad, mut outcome) = (Some(0), None, false, WriteOutcome::None);
+    let (mut now_ms, mut vehicle, mut in_order) = (u32::MAX - 50_000, 0, 0);
+    let mut counts = [0; 9];
+    for _ in 0..100_000 {
+        now_ms = now_ms.wrapping_add(
+            [rng.random_range(0..5), rng.random_range(1900..2100)][usize::from(rng.random_bool(0.004))],
+        );
+        let mut here = Conditions { now_ms, ..READY };
+        match rng.random_range(0..800) {
+            0 => here.mode = Mode::ALL[rng.random_range(0..7)],
+            1 => here.stands = false,
+            2 => here.settled = false,
+            _ => {}
+        }
+        if rng.random_bool(if in_order == 0 { 0.5 } else { 0.002 }) {
+            let in_use = if rng.random_bool(0.8) { 7 } else { 8 };
+            vehicle = rng.random_range(0..1 << 20);
+            assert_eq!(download.receive(&unlock(in_use, vehicle), &here), None);
+            until = (in_use == 7).then(|| now_ms.wrapping_add(UNLOCK_MS));
+            continue;
+        }
+        let index = if rng.random_bool(0.003) {
+            rng.random_range(0..good.len())
+        } else {
+            in_order
+        };
+        in_order = (index + 1) % good.len();
+        let sends_bad = index == 0 && rng.random_bool(0.2);
+        let taken = download.receive(&[good[index], bad[index]][usize::from(sends_bad)], &here);
+        let mut expected = None;
+        if index == 0 {
+            (next, is_bad) = (Some(0), sends_bad);
+        }
+        if let Some(due) = next {
+            let is_unlocked = until.is_some_and(|until: u32| until.wrapping_sub(now_ms) <= UNLOCK_MS);
+            outcome = match () {
+                () if here.mode != Mode::Standby => WriteOutcome::NotInStandby,
+                () if !here.stands => WriteOutcome::NotStanding,
+                () if !here.settled => WriteOutcome::TooSoon,
+                () if !is_unlocked => WriteOutcome::NotUnlocked,
+                () if index != due => WriteOutcome::OutOfOrder,
+                () if due + 1 < good.len() => WriteOutcome::Receiving,
+                () if is_bad => WriteOutcome::OutOfRange,
+                () => WriteOutcome::Taken,
+            };
+            expected = (outcome == WriteOutcome::Taken).then_some(Set { params: SET, vehicle });
+            let is_whole = matches!(outcome, WriteOutcome::Taken | WriteOutcome::OutOfRange);
+            let goes_on = outcome == WriteOutcome::Receiving;
+            until = until.filter(|_| goes_on);
+            next = (goes_on || is_whole).then_some(index + 1);
+            counts[outcome as usize] += 1;
+        }
+        assert_eq!((taken, download.status(None, false).outcome), (expected, outcome));
+    }
+    assert!(counts[1..].iter().all(|count| *count > 20), "{counts:?}");
 }

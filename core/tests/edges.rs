@@ -13,6 +13,7 @@ use haptic_core::ecu::injection::Region;
 use haptic_core::estimator::{Reading, Sample};
 use haptic_core::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_core::safety::actuator::{Actuator, Motor};
+use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
 
@@ -232,6 +233,36 @@ fn a_veto_hides_no_other_fault() {
             "{fault:?}"
         );
     }
+}
+
+/// All that a veto says, in the same step: no torque, no probe, its reason, for good.
+#[test]
+fn a_veto_takes_torque_and_probe_at_once() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.probe = true;
+    let step = rig.run(700);
+    assert!(step.command.probe.is_some());
+    rig.ecu.flip_bit(Region::Monitor, 40);
+    let Step {
+        command, guidance, ..
+    } = rig.tick();
+    assert_eq!((command.torque, command.probe), (Torque::ZERO, None));
+    assert_eq!((command.limit, command.mode), (LimitReason::Monitor, Mode::Fault));
+    assert!(command.warning);
+    let bytes: [u8; 8] = guidance.data().try_into().unwrap();
+    let told = Guidance::unpack(&bytes).unwrap();
+    assert_eq!(
+        (told.torque, told.limit, told.mode),
+        (Torque::ZERO, LimitReason::Monitor, Mode::Fault)
+    );
+    assert!(told.warning);
+    rig.telemetry = None;
+    let step = rig.run(40);
+    assert_eq!(
+        (step.command.torque, step.command.mode),
+        (Torque::ZERO, Mode::Fault)
+    );
+    assert_eq!(rig.telemetry.and_then(|telemetry| telemetry.probe), None);
 }
 
 /// The first of the three frames that a sender has to show is believed without its CRC.

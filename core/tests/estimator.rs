@@ -107,7 +107,7 @@ fn an_arm_that_obeys_equation_8_is_read_exactly() {
                 k_hg: &|_| k_hg,
                 slow_nm,
                 wheel: [0.02, -0.03],
-                ..Drive::of(params)
+                ..Drive::new(params)
             };
             let [read, deviation] = drive.last().unwrap();
             assert!((read - k_hg).abs() < 0.01, "{k_hg}: {read}, {params:?}");
@@ -129,7 +129,7 @@ fn the_deviation_holds_the_error_of_any_arm() {
                 t_nms_s,
                 k_hg: &|_| 0.8,
                 slow_nm: [0.02, 0.0],
-                ..Drive::of(params)
+                ..Drive::new(params)
             };
             let [read, deviation] = drive.last().unwrap();
             let w = TAU * params.probe_frequency_hz;
@@ -176,7 +176,7 @@ fn noisy_drives_are_read_as_the_rule_says() {
             lost: rng.random_range(5..1000),
             seconds: 120.0,
             seed,
-            ..Drive::of(params)
+            ..Drive::new(params)
         };
         drive.check((seed % 3) as usize, &mut seen);
     }
@@ -199,7 +199,7 @@ fn quiet_drives_are_read_as_the_rule_says() {
                 noise_nm: 0.004,
                 seconds: 100.0,
                 seed: seed as u64,
-                ..Drive::of(params)
+                ..Drive::new(params)
             };
             drive.check(1, &mut Seen::default());
         }
@@ -213,7 +213,7 @@ fn half_of_the_probe_is_enough() {
         for (share, is_read) in [(0.51, true), (0.49, false), (0.0, false)] {
             let drive = Drive {
                 applied: &|_| share,
-                ..Drive::of(params)
+                ..Drive::new(params)
             };
             assert_eq!(drive.last().is_some(), is_read, "{share}: {params:?}");
         }
@@ -229,7 +229,7 @@ fn a_probe_of_zero_is_not_read() {
     };
     let drive = Drive {
         noise_nm: 0.1,
-        ..Drive::of(params)
+        ..Drive::new(params)
     };
     assert!(told(&params, &drive.points(), 1).iter().all(Option::is_none));
 }
@@ -238,7 +238,7 @@ fn a_probe_of_zero_is_not_read() {
 #[test]
 fn hands_are_told_from_none_to_the_count() {
     let still = |counts: f64| {
-        let mut points = Drive::of(Params::PAPER).points();
+        let mut points = Drive::new(Params::PAPER).points();
         for (k, point) in points.iter_mut().enumerate() {
             // About a sensor's zero that is off.
             point.driver_nm = rounded(0.5) + LSB * counts * f64::from(u8::from(k % 5 == 3));
@@ -254,7 +254,7 @@ fn hands_are_told_from_none_to_the_count() {
         let drive = Drive {
             hands: &|t| !(off[0] * half_s - 3e-3..off[1] * half_s + 3e-3).contains(&t),
             seconds: 13.5 * half_s,
-            ..Drive::of(Params::PAPER)
+            ..Drive::new(Params::PAPER)
         };
         assert_eq!(drive.last().is_some(), is_kept, "{off:?}");
         drive.check(1, &mut Seen::default());
@@ -268,7 +268,7 @@ fn a_step_does_one_piece_of_the_work() {
     let drive = Drive {
         noise_nm: 0.1,
         seconds: 40.0,
-        ..Drive::of(Params::PAPER)
+        ..Drive::new(Params::PAPER)
     };
     let points = drive.points();
     let ends = expected(&Params::PAPER, &points, &mut Seen::default());

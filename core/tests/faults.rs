@@ -2,7 +2,7 @@
 //! masks written here by hand.
 
 use haptic_core::bus::messages::{Guidance, Message, ResetCause};
-use haptic_core::quantity::{Instant, Torque};
+use haptic_core::quantity::{Instant, Micros, Torque};
 use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::{Class, Fault, FaultHistory, FaultSet};
 use haptic_core::safety::modes::Mode;
@@ -81,4 +81,25 @@ fn the_history_counts_to_255_and_no_further() {
         let counts: Vec<u8> = history.records().map(|record| record.count).collect();
         assert_eq!(counts, [k.min(255) as u8]);
     }
+}
+
+/// Seconds since it last appeared, however often the clock wraps meanwhile, and no more than 16 bits hold; whether it is there.
+#[test]
+fn the_history_knows_when_a_fault_last_appeared() {
+    let mut now = Instant::from_us(u32::MAX - 10_000_000);
+    let mut history = FaultHistory::new(now);
+    let lane = FaultSet::NONE.with(Fault::LaneTimeout);
+    for second in 0..70_000_u32 {
+        let present = if second < 3 { lane } else { FaultSet::NONE };
+        history.step(now, present);
+        let record = history.records().next().unwrap();
+        assert_eq!(
+            (record.age_s, record.present),
+            (second.min(65_535) as u16, second < 3)
+        );
+        now = now.after(Micros::from_ms(1000));
+    }
+    history.step(now, lane);
+    let record = history.records().next().unwrap();
+    assert_eq!((record.age_s, record.count), (0, 2));
 }

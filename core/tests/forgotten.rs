@@ -5,6 +5,7 @@ use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
 use haptic_core::ecu::Boot;
 use haptic_core::quantity::{Metres, Micros, Radians};
+use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::safety::modes::Mode;
 
@@ -450,4 +451,66 @@ fn a_silence_after_a_step_is_a_silence() {
     rig.silent[VEHICLE] = true;
     let faults = rig.run(90).command.faults;
     assert!(faults.contains(Fault::SpeedTimeout) && !faults.contains(Fault::SpeedStep));
+}
+
+/// From Standby: two seconds of guidance, and then the camera's silence until guidance has ended.
+fn guided_and_lost(rig: &mut Rig) -> Vec<(f64, Mode, FaultSet, LimitReason)> {
+    rig.engage = true;
+    let steps = (0..6000).map(|ms| {
+        rig.silent[LANE] = ms >= 2000;
+        let command = rig.tick().command;
+        (command.torque.nm(), command.mode, command.faults, command.limit)
+    });
+    let steps = steps.collect();
+    rig.silent[LANE] = false;
+    steps
+}
+
+/// Whatever went wrong and ended guidance, some seconds later it is as at first, to the bit: torque, modes, faults and limits, and
+/// when and how the next loss ends it.
+#[test]
+fn guidance_after_any_loss_is_as_at_first() {
+    let first = guided_and_lost(&mut straight(0.4));
+    assert!(first[1000].0 > 0.19 && first[1000].1 == Mode::Active && first[5999].1 == Mode::Standby);
+    type Wrong = fn(&mut Rig);
+    let wrongs: [(&str, Wrong); 12] = [
+        ("no picture", |rig| rig.silent[LANE] = true),
+        ("no column", |rig| rig.silent[COLUMN] = true),
+        ("no speed", |rig| rig.silent[VEHICLE] = true),
+        ("no request", |rig| rig.silent[REQUEST] = true),
+        ("pictures marked as bad", |rig| rig.lane.valid = false),
+        ("another line", |rig| rig.lane.e_y = Metres::from_m(2.5)),
+        ("a line that slides", |rig| {
+            rig.lane.e_y = Metres::from_m(rig.lane.e_y.m() + 1.2e-3)
+        }),
+        ("old pictures", |rig| rig.lane.age = Micros::from_ms(120)),
+        ("a hand that turns nothing", |rig| rig.driver = Some(2.5)),
+        ("speeds apart", |rig| {
+            rig.speeds[1] = (rig.speeds[1] + 0.01).min(SPEED + 3.0)
+        }),
+        ("a yaw rate that lies", |rig| rig.yaw_rate = Some(0.1)),
+        ("a probe", |rig| rig.probe = true),
+    ];
+    for (what, wrong) in wrongs {
+        let mut rig = straight(0.4);
+        let right = rig.clone();
+        rig.engage = true;
+        rig.run(1000);
+        for _ in 0..5000 {
+            wrong(&mut rig);
+            rig.tick();
+        }
+        (rig.silent, rig.lane, rig.driver) = (right.silent, right.lane, right.driver);
+        (rig.speeds, rig.yaw_rate, rig.probe, rig.engage) = (right.speeds, right.yaw_rate, false, false);
+        // A multiple of all periods.
+        rig.run(20_000);
+        let again = guided_and_lost(&mut rig);
+        let differs = first.iter().zip(&again).position(|(first, again)| first != again);
+        assert_eq!(
+            differs,
+            None,
+            "{what}: {:?}",
+            differs.map(|ms| (first[ms], again[ms]))
+        );
+    }
 }

@@ -1,5 +1,6 @@
 //! The core's tests, one program: a module a subject. `cargo test -p haptic-core law_oracle::` runs one of them.
 
+mod another_law;
 mod attacks;
 mod coast;
 mod column;
@@ -30,6 +31,7 @@ mod plausibility;
 mod probe;
 mod quantity;
 mod ramp;
+mod reference;
 mod reliance;
 mod rig;
 mod road;

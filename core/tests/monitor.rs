@@ -546,6 +546,24 @@ fn falling_too_fast() {
     }
 }
 
+/// A hand that leaves nothing of a torque may end it at once, but one against the torque that follows on the other side may not.
+#[test]
+fn the_hand_that_ends_a_torque_at_once_is_against_that_torque() {
+    for sign in [1, -1] {
+        let bench = Bench::at(5.0, sign * counts(1000).0);
+        let turns = |driver_nm: i64| {
+            let driver = column(sign * driver_nm * 4096);
+            { bench }.show(
+                Some(lane(0, 0, 0)),
+                Some(driver),
+                guidance(-sign * counts(4).0, ACTIVE),
+                1000,
+            )
+        };
+        assert!(turns(-20) && !turns(20) && !turns(0));
+    }
+}
+
 #[test]
 fn once_withdrawn_it_stays_withdrawn() {
     let mut bench = Bench::new(5.0);
@@ -553,5 +571,39 @@ fn once_withdrawn_it_stays_withdrawn() {
     assert!(!bench.torque(100, STANDBY));
     for _ in 0..1000 {
         assert!(!bench.torque(0, STANDBY));
+    }
+}
+
+/// Steps of 1 ms and of far more: the age of a picture and the second after the probe was asked for are times of the clock. What is outside the
+/// band is counted in steps.
+#[test]
+fn times_are_those_of_the_clock_whatever_a_step_takes() {
+    for us in [1000, 1250, 1600, 2000, 50_000, 500_000] {
+        let aged = Bench::at(5.0, 40);
+        let shown =
+            |bench: &mut Bench, lane: Option<[u8; 8]>| bench.show(lane, None, guidance(40, ACTIVE), us);
+        let mut bench = aged;
+        assert!(shown(&mut bench, Some(lane(0, 0, 0))));
+        let steps = (0..3000).take_while(|_| shown(&mut bench, None)).count() as u32;
+        assert_eq!(steps, 1_760_000 / us, "{us} us");
+
+        // 0.45 N.m on a lane that asks for nothing: 0.3 are allowed, and 0.2 beside the probe.
+        let torque = counts(450).0;
+        let mut bench = Bench::at(5.0, torque);
+        let request = (1_u64 << 21).to_le_bytes();
+        let mut asks = |is_asked: bool| {
+            let evidence = Evidence {
+                lane: Some(&lane(0, 0, 0)),
+                column: None,
+                request: is_asked.then_some(&request),
+                guidance: &guidance(torque, ACTIVE),
+                elapsed_us: us,
+            };
+            bench.monitor.step(&mut bench.state, &evidence)
+        };
+        assert!((0..50).all(|_| asks(true)));
+        let steps = (0..3000).take_while(|_| asks(false)).count() as u32;
+        // While there is time left.
+        assert_eq!(steps, (1_030_000 - 1) / us + 20, "{us} us");
     }
 }

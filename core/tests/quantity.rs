@@ -1,6 +1,8 @@
 //! Quantities as counts of a converter and back, by hand.
 
-use haptic_core::quantity::{Radians, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Torque};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
 
 #[test]
 fn counts_become_quantities_and_saturate() {
@@ -33,4 +35,74 @@ fn quantities_become_counts_toward_zero() {
     }
     // A count of nothing is taken for the least there is, 2^-24.
     assert_eq!(Torque::from_nm(1.0).count_of(Torque::ZERO), 1 << 24);
+}
+
+/// All that quantities do, against whole numbers of 64 bits: sums, differences, magnitudes and products saturate on both sides.
+#[test]
+fn what_quantities_do_is_what_whole_numbers_do() {
+    let rng = &mut SmallRng::seed_from_u64(1);
+    let of = |counts: i64| counts.clamp(i32::MIN.into(), i32::MAX.into());
+    let edges = [i32::MIN, i32::MIN + 1, -1, 0, 1, i32::MAX - 1, i32::MAX];
+    let mut counts = || match rng.random_range(0..4) {
+        0 => edges[rng.random_range(0..edges.len())],
+        _ => rng.random::<i32>() >> rng.random_range(0..31),
+    };
+    // Exact: a count is 2^-24.
+    let quantity = |counts: i32| Metres::from_m(f64::from(counts) / 16_777_216.0);
+    let in_counts = |quantity: Metres| (quantity.m() * 16_777_216.0) as i64;
+    for _ in 0..100_000 {
+        let (a, b, times) = (counts(), counts(), counts() >> 16);
+        let ([x, y], [a, b]) = ([a, b].map(quantity), [a, b].map(i64::from));
+        assert_eq!(in_counts(x), a);
+        assert_eq!(in_counts(x.plus(y)), of(a + b));
+        assert_eq!(in_counts(x.minus(y)), of(a - b));
+        assert_eq!(in_counts(x.opposite()), of(-a));
+        assert_eq!(in_counts(x.abs()), of(a.abs()));
+        assert_eq!(in_counts(x.times(times)), of(a * i64::from(times)));
+        assert_eq!(
+            i64::from(x.count_of(y.abs())),
+            of(a / b.abs().clamp(1, i64::from(i32::MAX)))
+        );
+        assert_eq!(x.to_f32(), a as f32 / 16_777_216.0);
+    }
+    assert_eq!(
+        [Metres::MIN, Metres::MAX].map(in_counts),
+        [i32::MIN, i32::MAX].map(i64::from)
+    );
+    assert_eq!(Metres::from_m(f64::NAN), Metres::ZERO);
+    // To the nearest, on both sides of zero.
+    for (counts, nearest) in [
+        (0.49, 0),
+        (0.51, 1),
+        (1.49, 1),
+        (-0.49, 0),
+        (-0.51, -1),
+        (-1.49, -1),
+    ] {
+        assert_eq!(
+            in_counts(Metres::from_m(counts / 16_777_216.0)),
+            nearest,
+            "{counts}"
+        );
+    }
+}
+
+/// Across at most one wrap of the clock.
+#[test]
+fn instants_and_spans_are_counts_modulo_a_wrap() {
+    for (at, span) in [
+        (0, 0),
+        (5, 3),
+        (5, 7),
+        (u32::MAX, 1),
+        (1, u32::MAX),
+        (1 << 31, 1 << 31),
+    ] {
+        let (at, span) = (Instant::from_us(at), Micros::from_us(span));
+        assert_eq!(at.after(span).since(at), span);
+        assert_eq!(at.since(at.before(span)), span);
+        assert_eq!(at.after(span).us(), at.us().wrapping_add(span.us()));
+    }
+    assert_eq!(Micros::from_ms(7).us(), 7000);
+    assert_eq!(Micros::from_ms(u32::MAX).us(), u32::MAX);
 }

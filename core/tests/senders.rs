@@ -142,3 +142,21 @@ fn the_column_may_have_lost_what_fits_into_its_silence() {
         }
     }
 }
+
+/// Two frames of the column within a step, of which one says that the hand opposes: what the last says counts, for the monitor too,
+/// which else would find the torque to fall too fast, or to stay.
+#[test]
+fn of_two_frames_in_a_step_the_last_counts() {
+    for pushes in [[false, true], [true, false]] {
+        let mut rig = Rig::active_in_curve(1.0);
+        rig.t_us += 1000;
+        for push in pushes {
+            rig.driver = push.then_some(-10.0);
+            let frame = rig.frame(COLUMN);
+            assert_eq!(rig.send(&frame), Ok(()));
+        }
+        let step = rig.step();
+        assert!(step.permitted);
+        assert_eq!(step.command.torque.nm() == 0.0, pushes[1], "{} N.m", rig.applied);
+    }
+}

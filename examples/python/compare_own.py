@@ -18,7 +18,7 @@ scenario = { driver = { remnant_sd_nm = 0.1 } }
 law = [{ kind = "paper" }, { kind = "spring", stiffness_nm_per_rad = 3 }]
 driver = [{ kind = "paper" }, { kind = "intermittent" }]
 """
-ROAD = "[[segment]]\nlength = 150\n[[segment]]\nlength = 150\ncurvature = 0.003\n"
+ROAD = "[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 150\ncurvature_per_m = 0.003\n"
 
 
 class Spring:

@@ -227,3 +227,19 @@ pub fn on_fault() -> ! {
         ResetCause::HardFault
     })
 }
+
+/// The handlers of an image that runs the product: a panic or a fault brings the torque to zero and resets.
+#[macro_export]
+macro_rules! stop_on_panic_and_fault {
+    () => {
+        #[panic_handler]
+        fn panic(info: &core::panic::PanicInfo) -> ! {
+            $crate::product::on_panic(info)
+        }
+
+        #[cortex_m_rt::exception]
+        unsafe fn HardFault(_: &cortex_m_rt::ExceptionFrame) -> ! {
+            $crate::product::on_fault()
+        }
+    };
+}

@@ -1,19 +1,21 @@
-//! Parameters in flash: two copies of the set, each in pages of its own, so that a write touches one copy only while
-//! the other one is good.
+//! Keeps the parameters in flash as two copies of the set, each in pages of its own. A copy is written only while the
+//! other one is good.
 //!
-//! A copy is a region of two pages, in which `sequential-storage` appends and turns the pages over (layout, wear);
-//! a set is the block of `haptic_core::service::stored`, with version, number and CRC-32. [`save`] writes the copy that was
-//! not loaded, reads it back, and only then the other one. So power may go at any moment: the last good set, or
-//! the new one, is there.
+//! A copy is a region of two pages, in which the crate `sequential-storage` appends items and erases the older page
+//! when the newer one is full. A set is the block of `haptic_core::service::stored`, with version, number and CRC-32.
+//! [`save`] writes the copy that was not loaded, reads it back, and only then writes the other one. So the power may
+//! fail at any moment: either the last good set or the new one can be read.
 //!
-//! [`repair`] brings a copy that cannot be read, or that a cut left behind, up to the other one: at the next start, not
-//! at the next write, so that one rotten copy never waits for a second.
+//! [`repair`] rewrites a copy that cannot be read, or that is older because a write was cut short, from the other
+//! one. It runs at each start, not at the next write, so that a damaged copy does not remain until the other one is
+//! damaged too.
 //!
 //! The copies lie in the last four pages of the flash they are given; the board's memory map leaves these out.
 //!
-//! Why a region each and the read-back: the crate's own map recovers from a cut write too, but a store that it
-//! acknowledges after repeated cuts can be lost at the next start (its issue 136). Here that costs a second try,
-//! never a set. Not here: when to write (`product`: at a start, before anything moves).
+//! Two regions and the read-back are there for this reason: the crate's own map also recovers from a write that was
+//! cut short, but after repeated cuts a write that it reported as done can be missing at the next start (its issue
+//! 136). Here this costs a second attempt, and never the set. Not here: when to write (`product`: at a start, before
+//! anything moves).
 
 use core::future::Future;
 use core::pin::pin;
@@ -25,14 +27,14 @@ use haptic_core::service::stored::{self, BYTES, Set, Stored};
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
-/// Pages of a copy: fewer would leave none to turn over to.
+/// Pages of a copy: with fewer there would be no page to move to when one is full.
 const PAGES: u32 = 2;
 /// The block's key in its region.
 const KEY: u8 = 0;
 /// Key and block, rounded up to the words of any flash.
 const BUFFER: usize = (1 + BYTES).next_multiple_of(32);
 
-/// What lies in the memory.
+/// What was found in the flash.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Found {
     /// The newest good set.
@@ -41,14 +43,14 @@ pub struct Found {
     pub damaged: [bool; 2],
 }
 
-/// A set could not be written, or not read back. Copies that were good before are still.
+/// A set could not be written or read back. Copies that were good before are still good.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WriteFailed;
 
-/// Looks at both copies, as the processor of that number.
+/// Reads both copies; `hardware` is the number of this processor, whose copies alone are used.
 pub fn load<F: NorFlash>(flash: &mut F, hardware: u32) -> Found {
     let copies = [0, 1].map(|copy| read(flash, copy));
-    // A copy alone shows whether it is good.
+    // Whether a copy is good is decided without the other one.
     let is_good = |copy: &Option<[u8; BYTES]>| {
         copy.as_ref()
             .is_some_and(|bytes| stored::load([bytes, &[]], hardware).is_some())
@@ -81,7 +83,7 @@ pub fn save<F: NorFlash>(
     Ok(())
 }
 
-/// Brings the copy that is not in use up to the one that is, if they differ. Touches the other one only.
+/// Rewrites the copy that is not in use from the one in use, if they differ. The copy in use is not touched.
 ///
 /// # Errors
 /// It does not read back.
@@ -123,7 +125,7 @@ fn read<F: NorFlash>(flash: &mut F, copy: usize) -> Option<[u8; BYTES]> {
 fn write<F: NorFlash>(flash: &mut F, copy: usize, bytes: &[u8; BYTES]) -> Result<(), WriteFailed> {
     for is_second_try in [false, true] {
         if is_second_try {
-            // What cuts left behind stands in the way.
+            // Remains of interrupted writes may be in the way.
             let region = region(flash, copy);
             flash.erase(region.start, region.end).map_err(|_| WriteFailed)?;
         }
@@ -143,7 +145,7 @@ fn is_blank<F: NorFlash>(flash: &mut F, copy: usize) -> bool {
         .all(|at| flash.read(at, &mut chunk).is_ok() && chunk == [0xFF; 64])
 }
 
-/// The result of work that never waits: the flash below is a blocking one.
+/// Runs a future that never waits, as the flash below blocks, and returns its result.
 fn now<T>(work: impl Future<Output = T>) -> T {
     let mut work = pin!(work);
     loop {

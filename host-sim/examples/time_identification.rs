@@ -8,6 +8,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use haptic_analysis::identify::{DriveLog, Options, identify_as_published, identify_with_noise_model};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand_distr::{Distribution, StandardNormal};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -59,19 +62,10 @@ fn busy_s(began: Instant) -> f64 {
         .map_or_else(|| began.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
 }
 
-/// The log with white noise on its lane signals: sums of twelve uniform numbers of a congruential generator.
+/// The log with white noise on its lane signals.
 fn with_camera_noise(log: &DriveLog) -> DriveLog {
-    let mut state: u64 = 1;
-    let mut normal = || {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
-        }
-        sum
-    };
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let mut out = log.clone();
     for k in 0..out.len() {
         out.e_y_m[k] += 0.01 * normal();

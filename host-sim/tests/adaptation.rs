@@ -4,33 +4,13 @@ use std::fs;
 
 use crate::host_sim;
 
-const FILE: &str = "
-name = 'short'
-seeds = 1
-road = 'road.toml'
-speed_m_per_s = 16.666666666666668
-[scenario]
-guidance = { probe = true }
-[map]
-k_1 = [0.25, 0.45]
-k_hg = [0.1, 0.6]
-settles_s = 10
-averages_s = 20
-[loss]
-at_s = 40
-lasts_s = 2
-[[law]]
-kind = 'paper'
-[[driver]]
-kind = 'paper'
-around = [{ kind = 'trust', tau_s = 5 }]
-";
+const FILE: &str = include_str!("../batch/src/adaptation/short.toml");
 
 #[test]
 fn two_adaptations_leave_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    fs::write(folder.join("road.toml"), "[[segment]]\nlength = 200\n").unwrap();
+    fs::write(folder.join("road.toml"), "[[segment]]\nlength_m = 200\n").unwrap();
     fs::write(folder.join("study.toml"), FILE).unwrap();
     let run = |file, threads, place| {
         host_sim(

@@ -98,7 +98,7 @@ fn an_evaluation_prints_its_records_and_leaves_its_files() {
 #[test]
 fn another_course_speed_and_window_are_measured_without_claims() {
     let directory = tempfile::tempdir().unwrap();
-    let course = "lane_width = 3\n[[segment]]\nlength = 150\n[[segment]]\nlength = 100\ncurvature = -0.002\n";
+    let course = "lane_width_m = 3\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 100\ncurvature_per_m = -0.002\n";
     std::fs::write(directory.path().join("c.toml"), course).unwrap();
     let arguments = [
         "evaluate",
@@ -212,7 +212,7 @@ fn a_result_is_repeated_from_itself() {
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
     write(
         "c.toml",
-        "lane_width = 3.2\n[[segment]]\nlength = 100\n[[segment]]\nlength = 200\ncurvature = 0.0023\n",
+        "lane_width_m = 3.2\n[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 200\ncurvature_per_m = 0.0023\n",
     );
     write(
         "s.toml",
@@ -367,7 +367,7 @@ fn a_validation_judges_and_leaves_its_files() {
 fn a_run_records_its_bus_when_asked() {
     let directory = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
-    write("c.toml", "[[segment]]\nlength = 100\n");
+    write("c.toml", "[[segment]]\nlength_m = 100\n");
     write("s.toml", "course = 'c.toml'\nspeed_m_per_s = 20\n");
     let output = host_sim(directory.path(), &["run", "s.toml", "--out", "here", "--bus-log"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -403,7 +403,7 @@ fn a_run_records_its_bus_when_asked() {
 fn live_says_of_a_recorded_bus_what_changed_and_when() {
     let directory = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
-    write("c.toml", "[[segment]]\nlength = 200\n");
+    write("c.toml", "[[segment]]\nlength_m = 200\n");
     write(
         "s.toml",
         "course = 'c.toml'\nspeed_m_per_s = 20\n[failure]\nkind = 'input'\ntime_s = 3\n",

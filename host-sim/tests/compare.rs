@@ -34,7 +34,7 @@ fn compare(folder: &Path, arguments: &[&str]) -> Output {
 fn a_comparison_leaves_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    fs::write(folder.join("road.toml"), "[[segment]]\nlength = 400\n").unwrap();
+    fs::write(folder.join("road.toml"), "[[segment]]\nlength_m = 400\n").unwrap();
     fs::write(folder.join("study.toml"), FILE).unwrap();
     fs::write(folder.join("wrong.toml"), FILE.replace("seeds = 2", "seeds = 0")).unwrap();
     for threads in ["1", "3"] {

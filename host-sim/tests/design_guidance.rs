@@ -6,30 +6,9 @@ use std::process::Output;
 
 use crate::host_sim;
 
-const FILE: &str = "
-name = 'short'
-law = 'paper'
-[population]
-participants = [2, 13]
-own_line_share = 0.5
-own_line_m = 0.3
-[search]
-budget = 8
-stretch = [[1, 1]]
-scales = [[0.5, 9], [0.5, 2], [0.5, 2], [0.5, 2]]
-[training]
-seeds = 1
-roads = ['road.toml']
-speeds_m_per_s = [16.666666666666668]
-losses = 1
-[held_out]
-seeds = 1
-roads = ['road.toml']
-speeds_m_per_s = [13.88888888888889]
-losses = 1
-";
+const FILE: &str = include_str!("../batch/src/design_guidance/short.toml");
 
-const ROAD: &str = "[[segment]]\nlength = 100\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+const ROAD: &str = "[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
 
 fn design(folder: &Path, arguments: &[&str]) -> Output {
     host_sim(folder, &[&["design-guidance", "design.toml"], arguments].concat())

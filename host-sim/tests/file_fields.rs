@@ -9,7 +9,7 @@ use std::path::Path;
 
 use haptic_sim::fields::{Field, Range};
 use haptic_sim::input::InputError;
-use haptic_sim::models::road::Course;
+use haptic_sim::models::road::{Course, SEGMENT_FIELDS};
 use haptic_sim::scenario::{Scenario, TABLES};
 
 /// A row of a table.
@@ -344,26 +344,28 @@ fn the_table_of_a_course_is_the_codes() {
     assert_eq!(fields(""), top);
     assert_eq!(
         fields("segment"),
-        known(&course("[[segment]]\nlength = 9\nno_such_field = 1").unwrap_err())
+        known(&course("[[segment]]\nlength_m = 9\nno_such_field = 1").unwrap_err())
     );
+    let listed = SEGMENT_FIELDS.iter().map(|field| field.name.to_owned());
+    assert_eq!(fields("segment"), listed.collect());
     for row in &rows {
         let text = |value: &str| match row.field.as_str() {
-            "lane_width" => format!("lane_width = {value}\n[[segment]]\nlength = 9"),
-            "length" => format!("[[segment]]\nlength = {value}"),
-            pair if pair.ends_with("_start") => {
+            "lane_width_m" => format!("lane_width_m = {value}\n[[segment]]\nlength_m = 9"),
+            "length_m" => format!("[[segment]]\nlength_m = {value}"),
+            pair if pair.contains("_start") => {
                 let other = pair.replace("_start", "_end");
-                format!("[[segment]]\nlength = 9\n{pair} = {value}\n{other} = 0")
+                format!("[[segment]]\nlength_m = 9\n{pair} = {value}\n{other} = 0")
             }
-            pair if pair.ends_with("_end") => {
+            pair if pair.contains("_end") => {
                 let other = pair.replace("_end", "_start");
-                format!("[[segment]]\nlength = 9\n{other} = 0\n{pair} = {value}")
+                format!("[[segment]]\nlength_m = 9\n{other} = 0\n{pair} = {value}")
             }
-            field => format!("[[segment]]\nlength = 9\n{field} = {value}"),
+            field => format!("[[segment]]\nlength_m = 9\n{field} = {value}"),
         };
         if let Some(default) = &row.default {
             assert_eq!(
                 course(&text(default)),
-                course("[[segment]]\nlength = 9"),
+                course("[[segment]]\nlength_m = 9"),
                 "{row:?}"
             );
         }

@@ -27,7 +27,7 @@ name = \"anna\"
 person = true
 ";
 const COURSE: &str =
-    "lane_width = 3.6\n[[segment]]\nlength = 150\n[[segment]]\nlength = 300\ncurvature = 0.002\n";
+    "lane_width_m = 3.6\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 300\ncurvature_per_m = 0.002\n";
 /// What a person might leave: the lab writes the same columns.
 const PERSON: &str = "course = \"course.toml\"\nseed = 9\n[driver]\nt_p_s = 0.25\nremnant_sd_nm = 0.1\n";
 

@@ -17,15 +17,8 @@ limit = 0.3
 kind = \"torque\"
 [scenario.course]
 name = \"one curve\"
-lane_width = 3.6
-[[scenario.course.segment]]
-length = 60.0
-curvature_start = 0.0
-curvature_end = 0.0
-[[scenario.course.segment]]
-length = 140.0
-curvature_start = 0.003
-curvature_end = 0.003
+lane_width_m = 3.6
+segment = [{ length_m = 60.0 }, { length_m = 140.0, curvature_per_m = 0.003 }]
 
 [vary]
 \"driver.t_p_s\" = { uniform = [0.1, 0.5] }

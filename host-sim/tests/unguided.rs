@@ -9,8 +9,8 @@ use serde_json::Value;
 use crate::host_sim;
 
 /// A left curve of a radius of 800 m, held for a minute at 60 km/h.
-const HELD: &str = "[[segment]]\nlength = 200\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.00125\n\
-                    [[segment]]\nlength = 1000\ncurvature = 0.00125\n";
+const HELD: &str = "[[segment]]\nlength_m = 200\n[[segment]]\nlength_m = 100\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.00125\n\
+                    [[segment]]\nlength_m = 1000\ncurvature_per_m = 0.00125\n";
 /// A camera that is blind for 1.5 s every few seconds: the ECU hands over after a second of that.
 const BLIND: &str = "[sensor_errors]\ndropout_rate_per_s = 0.2\ndropout_duration_s = 1.5\n";
 const RELIANCES: [&str; 3] = ["high", "mid", "low"];
@@ -105,8 +105,8 @@ fn a_run_says_what_the_bus_says() {
 fn an_evaluation_that_rests_on_unguided_runs_fails() {
     let folder = folder();
     let here = folder.path();
-    let curve = "[[segment]]\nlength = 120\n[[segment]]\nlength = 80\ncurvature_start = 0\ncurvature_end = 0.0033\n\
-                 [[segment]]\nlength = 300\ncurvature = 0.0033\n[[segment]]\nlength = 140\n";
+    let curve = "[[segment]]\nlength_m = 120\n[[segment]]\nlength_m = 80\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.0033\n\
+                 [[segment]]\nlength_m = 300\ncurvature_per_m = 0.0033\n[[segment]]\nlength_m = 140\n";
     fs::write(here.join("curve.toml"), curve).unwrap();
     let mut failed = 0;
     for (course, speed) in [("held.toml", "60"), ("curve.toml", "120")] {

@@ -259,8 +259,8 @@ pub(crate) fn dbc() -> Vec<Vec<u8>> {
 }
 
 pub(crate) fn toml() -> Vec<Vec<u8>> {
-    let inline = "speed_m_per_s = 14\n[course]\nname = \"mine\"\nlane_width = 3\n[[course.segment]]\nlength = 300\n\
-                  curvature_start = 0\ncurvature_end = 0.01\n";
+    let inline = "speed_m_per_s = 14\n[course]\nname = \"mine\"\nlane_width_m = 3\n[[course.segment]]\nlength_m = 300\n\
+                  curvature_start_per_m = 0\ncurvature_end_per_m = 0.01\n";
     let speed = "[speed]\ntime_s = [0, 10]\nspeed_m_per_s = [14, 25]\n[failure]\ntime_s = 20\n";
     let sweep = "samples = 4\ndesign = \"latin-hypercube\"\n[vary]\nspeed = [40, 50]\n\
                  \"driver.t_p_s\" = { uniform = [0.1, 0.3] }\nseed = { from = 1, to = 5, count = 3 }\n";

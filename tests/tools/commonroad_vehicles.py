@@ -1,4 +1,4 @@
-"""Two manoeuvres of CommonRoad's vehicles, as a table for haptic-sim's test `models::real`.
+"""Two manoeuvres of CommonRoad's vehicles, as a table for haptic-sim's test `models::nonlinear`.
 
 The PyPI package `commonroad-vehicle-models` (BSD), its `vehicle_dynamics_st` and `vehicle_dynamics_mb` (29 states, with
 suspension and PAC2002 tyres) with parameter set 2 (a BMW 320i), integrated by the classical Runge-Kutta method with 1 ms.

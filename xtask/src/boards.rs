@@ -109,6 +109,16 @@ pub(crate) enum Scope {
     All,
 }
 
+/// The images with these features without a warning.
+pub(crate) fn lint(features: &str) -> Result<()> {
+    let package = "--profile firmware -p haptic-firmware --bins --lib";
+    run(cargo()
+        .arg("clippy")
+        .args(package.split(' '))
+        .args(["--target", M4F, "--features", features])
+        .args(["--", "-D", "warnings"]))
+}
+
 /// Boards without a warning; the torque path of the images without panic and float, and their figures as the golden file
 /// has them.
 pub(crate) fn check(scope: Scope, built: Built, bless: bool) -> Result<()> {
@@ -117,31 +127,22 @@ pub(crate) fn check(scope: Scope, built: Built, bless: bool) -> Result<()> {
     let wanted = |board: &&Board| scope == Scope::All || board.chip().is_none();
     for board in Board::value_variants().iter().filter(wanted) {
         let name = board.feature();
-        let package = [
-            "clippy",
-            "--profile",
-            "firmware",
-            "-p",
-            "haptic-firmware",
-            "--bins",
-            "--lib",
-        ];
-        run(cargo()
-            .args(package)
-            .args(["--target", M4F, "--features", name])
-            .args(["--", "-D", "warnings"]))
-        .with_context(|| name.to_owned())?;
+        lint(name).with_context(|| name.to_owned())?;
         for (image, roots) in [(Image::Lockstep, CONTROLLER), (Image::SteeringEcu, PRODUCT)] {
             let built =
                 of_image(&board.build(image)?, roots).with_context(|| format!("{name}, {}", image.bin()))?;
             if image == Image::Lockstep {
-                figures.push(longest(&board.build(image)?)?.of(name));
+                figures.push(longest(&board.build(image)?)?.on_board(name));
             } else {
-                figures.extend(built.into_iter().map(|figure| figure.of(name)));
+                figures.extend(built.into_iter().map(|figure| figure.on_board(name)));
             }
         }
         if board.chip().is_none() {
-            figures.extend(in_qemu(*board, built)?.into_iter().map(|figure| figure.of(name)));
+            figures.extend(
+                in_qemu(*board, built)?
+                    .into_iter()
+                    .map(|figure| figure.on_board(name)),
+            );
         }
     }
     for figure in figures.iter().filter(|figure| figure.name.ends_with(" step")) {
@@ -158,7 +159,7 @@ pub(crate) fn check(scope: Scope, built: Built, bless: bool) -> Result<()> {
 
 /// Beside what was counted: what no state can exceed.
 fn longest(elf: &Path) -> Result<Figure> {
-    let longest = longest::of(elf)?;
+    let longest = longest::read(elf)?;
     println!(
         "{}: at most {} instructions for a frame and {} for a step, by its machine code",
         elf.display(),
@@ -169,7 +170,7 @@ fn longest(elf: &Path) -> Result<Figure> {
 }
 
 impl Figure {
-    fn of(mut self, board: &str) -> Self {
+    fn on_board(mut self, board: &str) -> Self {
         self.name = format!("{board} {}", self.name);
         self
     }
@@ -186,8 +187,8 @@ fn figure(name: &str, unit: &'static str, value: u64, tolerance_percent: u64) ->
 
 /// What an image takes, and that its torque path is clean.
 fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
-    let size = size::of(elf)?;
-    let code = Code::of(elf)?;
+    let size = size::read(elf)?;
+    let code = Code::from_image(elf)?;
     let frame = code.largest_frame();
     ensure!(
         frame <= GUARD,

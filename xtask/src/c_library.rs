@@ -42,13 +42,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
     let image = image(&dist, &target)?;
     let in_qemu = output(
         command("qemu-system-arm")
-            .args([
-                "-M",
-                "mps2-an386",
-                "-nographic",
-                "-semihosting-config",
-                "enable=on,target=native",
-            ])
+            .args("-M mps2-an386 -nographic -semihosting-config enable=on,target=native".split(' '))
             .arg("-kernel")
             .arg(&image)
             .stdin(Stdio::null()),

@@ -19,7 +19,7 @@ use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
     bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, profiles, python, trace,
-    web, wheel,
+    venv, web, wheel,
 };
 
 /// Which stages run.
@@ -59,175 +59,51 @@ struct Stage {
     run: fn() -> Result<()>,
 }
 
-const fn stage(name: &'static str, when: When, what: &'static str, run: fn() -> Result<()>) -> Stage {
-    Stage {
-        name,
-        what,
-        when,
-        run,
-    }
+/// Stages, one line each: name, when, what, and how it is run.
+macro_rules! stages {
+    ($($name:literal $when:ident $what:literal: $run:expr;)*) => {
+        &[$(Stage { name: $name, what: $what, when: When::$when, run: $run }),*]
+    };
 }
 
 /// In this order. Long ones begin early, so that none is left alone at the end.
-const STAGES: &[Stage] = &[
-    stage("format", When::Before, "cargo fmt", format),
-    stage(
-        "build",
-        When::Before,
-        "every library, program and test, once",
-        build,
-    ),
-    stage(
-        "tests",
-        When::Beside,
-        "every test of the workspace and its documents",
-        tests,
-    ),
-    stage(
-        "boards",
-        When::Beside,
-        "QEMU's boards: lints, frames compared one by one, figures",
-        || boards::check(boards::Scope::Qemu, Built::ForTests, false),
-    ),
+const STAGES: &[Stage] = stages! {
+    "format" Before "cargo fmt": format;
+    "build" Before "every library, program and test, once": build;
+    "tests" Beside "every test of the workspace and its documents": tests;
+    "boards" Beside "QEMU's boards: lints, frames compared one by one, figures":
+        || boards::check(boards::Scope::Qemu, Built::ForTests, false);
     // Not beside the begin of the tests: cargo would let them wait for its lock.
-    stage("clippy", When::Beside, "lints of the workspace", clippy),
-    stage("page", When::Beside, "the lab, in a headless Chromium", || {
-        web::check(Built::ForTests)
-    }),
-    stage(
-        "python",
-        When::Beside,
-        "the Python package, its README and its examples",
-        || python::check(Built::ForTests),
-    ),
-    stage(
-        "gate",
-        When::Meanwhile,
-        "no panic, no wrap and no float in the torque path",
-        gate::run,
-    ),
-    stage(
-        "images",
-        When::Meanwhile,
-        "the images that tests start in QEMU",
-        images,
-    ),
-    stage(
-        "recordings",
-        When::Beside,
-        "files of other tools, read and written by these tools",
-        || logs::check(Built::ForTests),
-    ),
-    stage(
-        "documentation",
-        When::Beside,
-        "cargo doc without a warning",
-        documentation,
-    ),
-    stage("fmu", When::Beside, "the FMUs, judged by FMPy", || {
-        fmu::check(Built::ForTests)
-    }),
-    stage(
-        "c",
-        When::Beside,
-        "the C library and its header, on the host and in QEMU",
-        || c_library::check(Built::ForTests),
-    ),
-    stage(
-        "bindings-agree",
-        When::Beside,
-        "the same frames from every binding",
-        || bindings_agree::check(Built::ForTests),
-    ),
-    stage(
-        "requirements",
-        When::Beside,
-        "every requirement has its evidence",
-        || trace::run(false),
-    ),
-    stage("xtask", When::Beside, "tests of xtask itself", xtask_tests),
-    stage(
-        "all-boards",
-        When::Full,
-        "the same of all boards, the real ones' images among them",
-        || boards::check(boards::Scope::All, Built::ForTests, false),
-    ),
-    stage(
-        "wheel",
-        When::Full,
-        "the wheel as it is handed on, installed and tested",
-        || wheel::build(&wheel::Options::tested()),
-    ),
-    stage(
-        "fmu-shipped",
-        When::Full,
-        "the FMUs as they are handed on",
-        || fmu::check(Built::ToShip),
-    ),
-    stage(
-        "c-shipped",
-        When::Full,
-        "the C library as it is handed on",
-        || c_library::check(Built::ToShip),
-    ),
-    stage("page-shipped", When::Full, "the page as it is handed on", || {
-        web::check(Built::ToShip)
-    }),
-    stage(
-        "same-bits",
-        When::Full,
-        "an evaluation in every profile: the same bytes",
-        profiles::check,
-    ),
-    stage(
-        "instructions",
-        When::Full,
-        "instructions of a step on the host, against xtask/golden.json",
-        || bench::run(false),
-    ),
-    stage(
-        "coverage",
-        When::Full,
-        "every line and branch of core",
-        evidence::coverage,
-    ),
-    stage(
-        "defects-by-hand",
-        When::Full,
-        "defects made by hand in core: each is noticed",
-        by_hand::run,
-    ),
-    stage(
-        "mutants",
-        When::Full,
-        "a defect in every expression of core: each is noticed",
-        || evidence::mutants(&[], None),
-    ),
-    stage(
-        "fuzz",
-        When::Full,
-        "a million inputs for every reader, a thousand million bytes for the ECU",
-        fuzz,
-    ),
-    stage(
-        "campaign",
-        When::Full,
-        "every fault, 500 seeds, in the paper's world and four real ones",
-        campaign,
-    ),
-    stage(
-        "sanitised",
-        When::Full,
-        "core, log and C library with AddressSanitizer",
-        sanitised,
-    ),
-    stage(
-        "speed",
-        When::Full,
-        "the benchmarks, against C, NumPy and SciPy",
-        speed,
-    ),
-];
+    "clippy" Beside "lints of the workspace": clippy;
+    "page" Beside "the lab, in a headless Chromium": || web::check(Built::ForTests);
+    "python" Beside "the Python package, its README and its examples": || python::check(Built::ForTests);
+    "gate" Meanwhile "no panic, no wrap and no float in the torque path": gate::run;
+    "images" Meanwhile "the images that tests start in QEMU": images;
+    "recordings" Beside "files of other tools, read and written by these tools":
+        || logs::check(Built::ForTests);
+    "documentation" Beside "cargo doc without a warning": documentation;
+    "fmu" Beside "the FMUs, judged by FMPy": || fmu::check(Built::ForTests);
+    "c" Beside "the C library and its header, on the host and in QEMU": || c_library::check(Built::ForTests);
+    "bindings-agree" Beside "the same frames from every binding": || bindings_agree::check(Built::ForTests);
+    "requirements" Beside "every requirement has its evidence": || trace::run(false);
+    "xtask" Beside "tests of xtask itself": xtask_tests;
+    "all-boards" Full "the same of all boards, the real ones' images among them":
+        || boards::check(boards::Scope::All, Built::ForTests, false);
+    "wheel" Full "the wheel as it is handed on, installed and tested":
+        || wheel::build(&wheel::Options::tested());
+    "fmu-shipped" Full "the FMUs as they are handed on": || fmu::check(Built::ToShip);
+    "c-shipped" Full "the C library as it is handed on": || c_library::check(Built::ToShip);
+    "page-shipped" Full "the page as it is handed on": || web::check(Built::ToShip);
+    "same-bits" Full "an evaluation in every profile: the same bytes": profiles::check;
+    "instructions" Full "instructions of a step on the host, against xtask/golden.json": || bench::run(false);
+    "coverage" Full "every line and branch of core": evidence::coverage;
+    "defects-by-hand" Full "defects made by hand in core: each is noticed": by_hand::run;
+    "mutants" Full "a defect in every expression of core: each is noticed": || evidence::mutants(&[], None);
+    "fuzz" Full "a million inputs for every reader, a thousand million bytes for the ECU": fuzz;
+    "campaign" Full "every fault, 500 seeds, in the paper's world and four real ones": campaign;
+    "sanitised" Full "core, log and C library with AddressSanitizer": sanitised;
+    "speed" Full "the benchmarks, against C, NumPy and SciPy": speed;
+};
 
 /// Runs what is asked for; an error names the stages that failed.
 pub(crate) fn check(options: &Options) -> Result<()> {
@@ -415,7 +291,7 @@ fn print_count() {
 /// Packages of Debian and of Python that stages need, while the workspace is built.
 fn prepare() -> Result<()> {
     tool::ensure(&TOOLS)?;
-    python::environment().map(drop)
+    venv::environment().map(drop)
 }
 
 /// Programs, and the packages of Debian that bring them.
@@ -473,19 +349,7 @@ fn clippy() -> Result<()> {
     let lints = ["clippy", "--release", "--workspace", "--all-targets"];
     run(cargo().args(lints).args(["--", "-D", "warnings"]))?;
     // The reference board's images, those that break themselves too.
-    let features = format!("{BOARD},gate,broken,bench");
-    run(cargo()
-        .args([
-            "clippy",
-            "--profile",
-            "firmware",
-            "-p",
-            "haptic-firmware",
-            "--bins",
-            "--lib",
-        ])
-        .args(["--target", M4F, "--features", &features])
-        .args(["--", "-D", "warnings"]))
+    boards::lint(&format!("{BOARD},gate,broken,bench"))
 }
 
 /// A link that leads nowhere is an error.
@@ -500,14 +364,7 @@ fn fuzz() -> Result<()> {
         .args(["test", "--release", "-p", "haptic-core", "fuzz::"])
         .env("HAPTIC_FUZZ_BYTES", "1000000000"))?;
     run(cargo()
-        .args([
-            "test",
-            "--release",
-            "-p",
-            "haptic-guidance",
-            "--test",
-            "fuzz_readers",
-        ])
+        .args("test --release -p haptic-guidance --test fuzz_readers".split(' '))
         .env("HAPTIC_FUZZ_INPUTS", "1000000"))
 }
 
@@ -528,16 +385,7 @@ fn campaign() -> Result<()> {
 fn sanitised() -> Result<()> {
     let target = "x86_64-unknown-linux-gnu";
     run(cargo()
-        .args([
-            "test",
-            "--release",
-            "-p",
-            "haptic-core",
-            "-p",
-            "haptic-log",
-            "--lib",
-            "--tests",
-        ])
+        .args("test --release -p haptic-core -p haptic-log --lib --tests".split(' '))
         .args(["--target", target])
         .env("RUSTC_BOOTSTRAP", "1")
         .env("RUSTFLAGS", "-Zsanitizer=address")

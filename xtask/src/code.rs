@@ -47,7 +47,7 @@ pub(crate) struct TorquePath {
 }
 
 impl Code {
-    pub(crate) fn of(elf: &Path) -> Result<Self> {
+    pub(crate) fn from_image(elf: &Path) -> Result<Self> {
         let text = tool::output(
             tool::llvm("llvm-objdump")?
                 .args(["-d", "-C", "--no-show-raw-insn"])

@@ -29,7 +29,7 @@ pub(crate) fn run() -> Result<()> {
     for target in [M4F, M3] {
         let elf = match elf_of(&mut gate("gate", target)) {
             Ok(elf) => elf,
-            Err(error) => bail!("{error}: {}", whence(target)),
+            Err(error) => bail!("{error}: {}", calls_to_panic(target)),
         };
         let symbols = symbols(&elf)?;
         ensure!(symbols.len() > 20, "{target}: the gate image has hardly a symbol");
@@ -71,7 +71,7 @@ pub(crate) fn run() -> Result<()> {
 fn injection_leaves_nothing() -> Result<()> {
     let measure = |features| {
         let elf = elf_of(&mut gate(features, M4F))?;
-        let functions = Code::of(&elf)?.torque_path(CONTROLLER)?.functions;
+        let functions = Code::from_image(&elf)?.torque_path(CONTROLLER)?.functions;
         let sections = tool::output(tool::llvm("llvm-size")?.arg("-A").arg(elf))?;
         let size = |name: &str| {
             let line = sections.lines().find(|line| line.starts_with(name));
@@ -98,9 +98,9 @@ fn gate(feature: &str, target: &str) -> std::process::Command {
 }
 
 /// The calls from the step to a panic, in the image whose panic handler links.
-fn whence(target: &str) -> String {
+fn calls_to_panic(target: &str) -> String {
     let path = elf_of(&mut gate("gate-that-links", target))
-        .and_then(|elf| Code::of(&elf))
+        .and_then(|elf| Code::from_image(&elf))
         .and_then(|code| code.torque_path(CONTROLLER));
     match path {
         Err(error) => format!("{error:#}"),

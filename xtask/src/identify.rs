@@ -14,19 +14,10 @@ const OUT: &str = "target/bench-identify";
 
 pub(crate) fn run() -> Result<()> {
     tool::ensure(&[("python3", "python3-venv")])?;
-    let python = speed::build_venv()?;
+    let python = speed::python()?;
     tool::output(
         tool::cargo()
-            .args([
-                "run",
-                "--profile",
-                "dist",
-                "-q",
-                "-p",
-                "host-sim",
-                "--",
-                "experiment",
-            ])
+            .args("run --profile dist -q -p host-sim -- experiment".split(' '))
             .args([
                 "--participant",
                 "5",

@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 
-use crate::python;
 use crate::tool::{Built, command, root, run};
+use crate::venv;
 
 const SCENARIO: &str = "examples/relying-driver.toml";
 const DRIVE: &str = "tests/data/driver-logs/guided-passive.csv";
@@ -32,7 +32,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
         Ok(short)
     };
     let (csv, bus) = (head("run.csv", ROWS)?, head("bus.log", FRAMES)?);
-    run(command(&python::environment()?.to_string_lossy())
+    run(command(&venv::environment()?.to_string_lossy())
         .arg("host-sim/log/peers/check.py")
         .args([&host_sim, &place, &csv, &bus])
         .arg(DRIVE))

@@ -1,9 +1,9 @@
-//! A bound of the instructions of the longest path through the torque path, from the machine code of an image.
+//! An upper bound of the number of instructions that the torque path executes, from the machine code of an image.
 //!
-//! Between branches every instruction counts one, an instruction that a condition skips too. Of two ways the longer one
-//! counts, whether or not a state exists that takes it; a call counts what it calls. A loop counts as often as
-//! [`LOOPS`] allows, and a loop in a function that is not in that table is an error. So the bound may be far above what
-//! can happen, and never below.
+//! Every instruction counts one, even if a condition skips it. At a branch the longer of both ways counts, whether or
+//! not any state takes it. A call counts as the longest path of the called function. A loop counts as many times as
+//! [`LOOPS`] allows; a loop in a function that is not in that table is an error. So the bound may be far above the
+//! real maximum, but never below it.
 //!
 //! Not here: which functions may be on the path at all (`code`), and what a step really took (`host-sim ecu pil --count`).
 
@@ -19,7 +19,7 @@ use petgraph::graphmap::DiGraphMap;
 use crate::code::{self, CONTROLLER};
 use crate::tool;
 
-/// How often any loop of a function can begin anew, and why. Names begin so.
+/// How many times a loop of a function can run, and why. The first entry is the beginning of the function's name.
 const LOOPS: &[(&str, u64, &str)] = &[
     // The longest it clears or copies is the parameters' own memory.
     (
@@ -39,8 +39,8 @@ const LOOPS: &[(&str, u64, &str)] = &[
     ),
 ];
 
-/// Frames that can arrive within a millisecond: eight bytes take at least 222 us at 500 kbit/s, and one may have begun
-/// before.
+/// Most frames that can arrive within a millisecond: a frame of eight bytes takes at least 222 us at 500 kbit/s, and
+/// one may have begun before the millisecond.
 pub(crate) const FRAMES_IN_A_TICK: u64 = 5;
 
 /// The bounds, in instructions.
@@ -53,7 +53,7 @@ pub(crate) struct Longest {
 }
 
 impl Longest {
-    /// A tick with as many frames as the bus can bring.
+    /// A tick with as many frames as the bus can carry.
     pub(crate) const fn tick(self) -> u64 {
         self.step + FRAMES_IN_A_TICK * self.receive
     }
@@ -61,7 +61,7 @@ impl Longest {
 
 /// # Errors
 /// A loop without a bound, or code that cannot be followed.
-pub(crate) fn of(elf: &Path) -> Result<Longest> {
+pub(crate) fn read(elf: &Path) -> Result<Longest> {
     let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
     let file = object::File::parse(&*bytes).context("no ELF file")?;
     let section = file.section_by_name(".text").context("no section .text")?;
@@ -85,7 +85,7 @@ struct Instruction {
     operands: String,
 }
 
-/// Where an instruction leads, as places in its function, and the function that it calls or jumps to.
+/// The instructions that may follow, as indices in the function, and the function that is called or jumped to.
 #[derive(Default)]
 struct Flow {
     next: Vec<usize>,
@@ -137,7 +137,7 @@ impl<'a> Paths<'a> {
         self.of_function(address)
     }
 
-    /// The longest path through a function and what it calls. `code` has refused recursions before.
+    /// The longest path through a function and the functions that it calls. Recursion was refused before, by `code`.
     fn of_function(&mut self, address: u64) -> Result<u64> {
         if let Some(known) = self.known.get(&address) {
             return Ok(*known);
@@ -147,7 +147,7 @@ impl<'a> Paths<'a> {
             .remove(&address)
             .with_context(|| format!("no function at {address:#x}, or it calls itself"))?;
         let flows = self.flows(&instructions).with_context(|| name.clone())?;
-        // What fills the space behind a function reads as instructions too, and nothing leads there.
+        // Padding behind a function is decoded as instructions too, but no instruction leads there.
         let all = reached(&flows);
         let mut costs = vec![0; flows.len()];
         for place in &all {
@@ -200,7 +200,7 @@ impl<'a> Paths<'a> {
         instructions.iter().enumerate().map(flow).collect()
     }
 
-    /// Where a table branch leads. Its table stands behind it, and ends where the first of its targets begins.
+    /// The targets of a table branch. The table lies behind the instruction and ends where its first target begins.
     fn table(&self, at: &Instruction, places: &BTreeMap<u64, usize>) -> Result<Vec<usize>> {
         let (base, width) = (at.address + 4, if at.mnemonic == "tbb" { 1 } else { 2 });
         let (mut place, mut end) = (base, u64::MAX);
@@ -217,7 +217,7 @@ impl<'a> Paths<'a> {
                 .fold(0, |sum, byte| sum << 8 | u64::from(*byte));
             place += width as u64;
             let target = base + 2 * entry;
-            // What fills the table to an even length is no entry.
+            // A byte that pads the table to an even length is not an entry.
             if target >= place {
                 targets.insert(
                     *places
@@ -231,7 +231,7 @@ impl<'a> Paths<'a> {
     }
 }
 
-/// The places that a function can come to from its first.
+/// The instructions that can be reached from the first one.
 fn reached(flows: &[Flow]) -> BTreeSet<usize> {
     let mut reached = BTreeSet::new();
     let mut open = vec![0];
@@ -257,12 +257,12 @@ fn is_conditional(mnemonic: &str, base: &str) -> bool {
 struct Graph {
     next: Vec<Vec<usize>>,
     costs: Vec<u64>,
-    /// How often a loop may begin; `None`: there must be none.
+    /// How many times a loop may run; `None` if there must be no loop.
     rounds: Option<u64>,
 }
 
 impl Graph {
-    /// The longest way through `nodes` from one of `entries`; ways into `closed` are not taken.
+    /// The longest path through `nodes` from one of `entries`; edges into `closed` are ignored.
     fn longest(
         &self,
         nodes: &BTreeSet<usize>,
@@ -280,7 +280,7 @@ impl Graph {
             .collect();
         let mut best: Vec<u64> = Vec::with_capacity(groups.len());
         for (group, members) in groups.iter().enumerate() {
-            // What comes after a group was found before it.
+            // The groups are sorted so that those after a group were computed before it.
             let leaving = members
                 .iter()
                 .flat_map(|node| steps(*node))
@@ -312,7 +312,7 @@ impl Graph {
     }
 }
 
-/// Nodes that lead to each other, each group after all that it leads to.
+/// The groups of nodes that can reach each other (strongly connected components), each after those that it leads to.
 fn groups<I: Iterator<Item = usize>>(
     nodes: &BTreeSet<usize>,
     next: &impl Fn(usize) -> I,

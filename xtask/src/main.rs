@@ -27,6 +27,7 @@ mod size;
 mod speed;
 mod tool;
 mod trace;
+mod venv;
 mod web;
 mod wheel;
 

@@ -1,69 +1,19 @@
-//! Python: one virtual environment with all that tests and examples need, and the package in it.
+//! The Python package: tested as the other tests build it, or as the wheel that is handed on.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result};
 
 use crate::tool::{Built, command, root, run};
+use crate::venv::environment;
 use crate::wheel;
-
-/// What the tests of the package, its examples, and the peers of recordings and FMUs need.
-pub(crate) const PACKAGES: [&str; 18] = [
-    "asammdf",
-    "cantools",
-    "commonroad-vehicle-models",
-    "distributed",
-    "fmpy",
-    "gymnasium>=1.1",
-    "ipykernel",
-    "matplotlib",
-    "mcap",
-    "mypy",
-    "nbclient",
-    "numpy",
-    "pandas",
-    "pyarrow",
-    "pytest",
-    "python-can",
-    "scipy",
-    "tqdm",
-];
 
 /// The package's tests but those of the wheel that is handed on, and what it may not link.
 pub(crate) fn check(built: Built) -> Result<()> {
     wheel::look_at_crates()?;
-    run(with_package(built)?.args([
-        "-m",
-        "pytest",
-        "bindings/python",
-        "--ignore",
-        "bindings/python/tests/test_wheel.py",
-    ]))
-}
-
-/// The interpreter of the environment that all checks share, made where it is not there.
-pub(crate) fn environment() -> Result<PathBuf> {
-    environment_of(&root().join("target/python/checks"), &PACKAGES)
-}
-
-/// The interpreter of an environment with these packages.
-pub(crate) fn environment_of(place: &Path, packages: &[&str]) -> Result<PathBuf> {
-    let python = place.join("bin/python");
-    if !python.exists() {
-        run(command("python3").args(["-m", "venv"]).arg(place))
-            .context("Python 3 with venv is needed: apt-get install python3-venv")?;
-    }
-    let installed = place.join("packages.txt");
-    let list = packages.join("\n");
-    if std::fs::read_to_string(&installed).is_ok_and(|there| there == list) {
-        return Ok(python);
-    }
-    run(command(&python.to_string_lossy())
-        .args(["-m", "pip", "install", "-q", "--disable-pip-version-check"])
-        .args(packages))?;
-    std::fs::write(&installed, list)?;
-    Ok(python)
+    run(with_package(built)?
+        .args("-m pytest bindings/python --ignore bindings/python/tests/test_wheel.py".split(' ')))
 }
 
 /// Copies a file so that another stage, which imports the package meanwhile, finds the old one or the new one, whole.

@@ -181,10 +181,7 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
         .args(["-serial", &bus(&options.can)])
         .args(["-serial", &format!("tcp:{}", log.local_addr()?)])
         // For the lock-step image, which takes its channel from here.
-        .args([
-            "-semihosting-config",
-            "enable=on,target=native,arg=image,arg=slcan",
-        ])
+        .args("-semihosting-config enable=on,target=native,arg=image,arg=slcan".split(' '))
         .arg("-kernel")
         .arg(elf)
         .stdin(if options.can == "stdio" {

@@ -17,7 +17,7 @@ pub(crate) struct Size {
 }
 
 /// The size of an ELF.
-pub(crate) fn of(elf: &Path) -> Result<Size> {
+pub(crate) fn read(elf: &Path) -> Result<Size> {
     let text = tool::output(tool::llvm("llvm-size")?.arg("-A").arg(elf))?;
     let mut size = Size { flash: 0, ram: 0 };
     for line in text.lines() {

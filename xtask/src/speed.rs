@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{callgrind, tool};
+use crate::{callgrind, tool, venv};
 
 /// Runs of a loop within a round; the fastest of them counts.
 const REPEAT: &str = "5";
@@ -54,7 +54,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let ours = callgrind::build_closed_loop()?;
     let c = build_c("target/closed_loop_c", &[])?;
     let c_with_ours = build_c_with_the_shipping_ecu()?;
-    let python = build_venv()?;
+    let python = python()?;
     let lanes = callgrind::build("lanes")?;
     let [mut full, mut light, mut peer, mut peer_with_ours, mut numpy] = [const { Vec::new() }; 5];
     let mut by_width = [const { Vec::new() }; 3];
@@ -154,19 +154,9 @@ fn build_c_with_the_shipping_ecu() -> Result<String> {
     )
 }
 
-/// A virtual environment with NumPy and SciPy, made once.
-pub(crate) fn build_venv() -> Result<String> {
-    let venv = tool::root().join("target/venv");
-    let python = venv.join("bin/python");
-    let is_ready = |python: &std::path::Path| {
-        let mut import = tool::command(&python.to_string_lossy());
-        python.exists() && tool::run(import.args(["-c", "import numpy, scipy"])).is_ok()
-    };
-    if !is_ready(&python) {
-        tool::run(tool::command("python3").args(["-m", "venv"]).arg(&venv))?;
-        let pip = ["-m", "pip", "install", "-q", "numpy", "scipy"];
-        tool::run(tool::command(&python.to_string_lossy()).args(pip))?;
-    }
+/// An interpreter with NumPy and SciPy.
+pub(crate) fn python() -> Result<String> {
+    let python = venv::environment_of(&tool::root().join("target/venv"), &["numpy", "scipy"])?;
     Ok(python.to_string_lossy().into_owned())
 }
 

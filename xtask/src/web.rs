@@ -5,8 +5,8 @@ use std::process::Stdio;
 
 use anyhow::{Context, Result, bail};
 
-use crate::python;
 use crate::tool::{Built, cargo, command, ensure, exists, output, root, run};
+use crate::venv;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 const LARGEST_BYTES: u64 = 1_000_000;
@@ -77,7 +77,7 @@ fn try_it(built: Built) -> Result<()> {
             .stdout(Stdio::null())
             .stderr(Stdio::null()))?;
     }
-    let python = python::environment_of(&root().join("target/python/page"), &AXE)?;
+    let python = venv::environment_of(&root().join("target/python/page"), &AXE)?;
     let find = "import axe_playwright_python as a; print(a.__path__[0] + '/axe.min.js')";
     let axe = output(command(&python.to_string_lossy()).args(["-c", find]))?;
     let data = ["run/run.csv", "run/results.json", "evaluation/results.json"].map(|file| place.join(file));

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
-use crate::python;
 use crate::tool::{cargo, command, output, root, run};
+use crate::venv;
 
 /// What `cargo xtask wheel` is asked for.
 #[derive(Debug, Args)]
@@ -73,7 +73,7 @@ pub(crate) fn installed() -> Result<PathBuf> {
 
 fn make() -> Result<PathBuf> {
     let tools = root().join("target/python/tools");
-    python::environment_of(&tools, &[MATURIN])?;
+    venv::environment_of(&tools, &[MATURIN])?;
     let dist = root().join("target/dist");
     let wheels = || {
         let files = std::fs::read_dir(&dist).into_iter().flatten().flatten();
@@ -87,14 +87,7 @@ fn make() -> Result<PathBuf> {
     }
     let maturin = tools.join("bin/maturin");
     run(command(&maturin.to_string_lossy())
-        .args([
-            "build",
-            "--profile",
-            "dist",
-            "-m",
-            "bindings/python/Cargo.toml",
-            "--out",
-        ])
+        .args("build --profile dist -m bindings/python/Cargo.toml --out".split(' '))
         .arg(&dist))?;
     wheels().next().context("maturin left no wheel")
 }
@@ -131,7 +124,7 @@ pub(crate) fn look_at_crates() -> Result<()> {
 
 /// An environment with the wheel, nothing of an older one, and what its tests need.
 fn install(wheel: &Path) -> Result<PathBuf> {
-    let python = python::environment_of(&root().join("target/python/wheel"), &python::PACKAGES)?;
+    let python = venv::environment_of(&root().join("target/python/wheel"), &venv::PACKAGES)?;
     let fresh = ["-m", "pip", "install", "-q", "--force-reinstall", "--no-deps"];
     run(command(&python.to_string_lossy()).args(fresh).arg(wheel))?;
     Ok(python)

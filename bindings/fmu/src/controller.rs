@@ -12,7 +12,7 @@ use haptic_sim::unguided::{Cause, Circumstances, Watch};
 
 use crate::error::FmuError;
 use crate::model::{About, Model, Texts};
-use crate::variable::{Kind, Role, Variable, input, limits, variable};
+use crate::variable::{Kind, Role, Variable, driver_torque, input, limits, variable, variables, wheel_angle};
 
 /// The model.
 pub static ABOUT: About = About {
@@ -30,103 +30,30 @@ use Role::{Input, Output, Parameter, Tunable};
 
 /// Every variable, the controller's own parameters last.
 pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
-    let own = [
-        input(
-            "e_y_m",
-            "m",
-            limits::LATERAL_M,
-            "Lateral error at the near point, positive: the target is to the left",
-        ),
-        input(
-            "e_theta_rad",
-            "rad",
-            limits::YAW_RAD,
-            "Yaw error at the far point",
-        ),
-        input(
-            "driver_torque_nm",
-            "N.m",
-            limits::TORQUE_NM,
-            "Torque of the driver on the column",
-        ),
-        input(
-            "wheel_angle_rad",
-            "rad",
-            limits::WHEEL_RAD,
-            "Angle of the steering wheel",
-        ),
-        input(
-            "motor_torque_nm",
-            "N.m",
-            limits::TORQUE_NM,
-            "Torque that the motor delivers",
-        ),
-        input(
-            "speed_m_per_s",
-            "m/s",
-            limits::SPEED_M_PER_S,
-            "Speed of the vehicle",
-        ),
-        input(
-            "yaw_rate_rad_per_s",
-            "rad/s",
-            limits::YAW_RATE_RAD_PER_S,
-            "Measured yaw rate of the vehicle, positive to the left",
-        ),
-        variable(
-            "yaw_rate_valid",
-            Boolean,
-            Input,
-            "",
-            "The vehicle measures its yaw rate",
-        ),
-        input(
-            "authority",
-            "",
-            [0.0, 1.0],
-            "Share of the guidance torque that is allowed, 0 to 1",
-        ),
-        variable(
-            "engage",
-            Boolean,
-            Input,
-            "",
-            "Guidance is wanted; the ECU takes a rise of it",
-        ),
-        variable("probe", Boolean, Input, "", "The probe is wanted"),
-        variable(
-            "engaged_at_start",
-            Boolean,
-            Parameter,
-            "",
-            "Guiding from the start, every sender trusted",
-        ),
-        variable("torque_nm", Real, Output, "N.m", "Guidance torque to apply"),
-        variable("mode", Integer, Output, "", "Mode, as in core/haptic.dbc"),
-        variable(
-            "limit",
-            Integer,
-            Output,
-            "",
-            "Limit that acted, as in core/haptic.dbc",
-        ),
-        variable("faults", Integer, Output, "", "Fault word, as in core/haptic.dbc"),
-        variable("warning", Boolean, Output, "", "The driver has to take over"),
-        variable(
-            "unguided_cause",
-            Integer,
-            Output,
-            "",
-            "Why the guidance left: 0 while it is there, or was never; as in a time series (docs/reference/formats.md)",
-        ),
-        variable(
-            "unguided_s",
-            Real,
-            Output,
-            "s",
-            "How long the guidance was away since it was there first",
-        ),
-    ];
+    let own = variables! {
+        input "e_y_m", "m", limits::LATERAL_M,
+            "Lateral error at the near point, positive: the target is to the left";
+        input "e_theta_rad", "rad", limits::YAW_RAD, "Yaw error at the far point";
+        driver_torque;
+        wheel_angle;
+        input "motor_torque_nm", "N.m", limits::TORQUE_NM, "Torque that the motor delivers";
+        input "speed_m_per_s", "m/s", limits::SPEED_M_PER_S, "Speed of the vehicle";
+        input "yaw_rate_rad_per_s", "rad/s", limits::YAW_RATE_RAD_PER_S,
+            "Measured yaw rate of the vehicle, positive to the left";
+        variable "yaw_rate_valid", Boolean, Input, "", "The vehicle measures its yaw rate";
+        input "authority", "", [0.0, 1.0], "Share of the guidance torque that is allowed, 0 to 1";
+        variable "engage", Boolean, Input, "", "Guidance is wanted; the ECU takes a rise of it";
+        variable "probe", Boolean, Input, "", "The probe is wanted";
+        variable "engaged_at_start", Boolean, Parameter, "", "Guiding from the start, every sender trusted";
+        variable "torque_nm", Real, Output, "N.m", "Guidance torque to apply";
+        variable "mode", Integer, Output, "", "Mode, as in core/haptic.dbc";
+        variable "limit", Integer, Output, "", "Limit that acted, as in core/haptic.dbc";
+        variable "faults", Integer, Output, "", "Fault word, as in core/haptic.dbc";
+        variable "warning", Boolean, Output, "", "The driver has to take over";
+        variable "unguided_cause", Integer, Output, "",
+            "Why the guidance left: 0 while it is there, or was never; as in a time series (docs/reference/formats.md)";
+        variable "unguided_s", Real, Output, "s", "How long the guidance was away since it was there first";
+    };
     let mut all = [own[0]; OWN + PARAMETERS.len()];
     let mut i = 0;
     while i < all.len() {
@@ -241,7 +168,7 @@ impl Model for Controller {
             ..,
         ] = *values
         else {
-            return Err(FmuError::Other("variables are missing"));
+            return Err(FmuError::MissingValues(values.len()));
         };
         let step = self.steps;
         // The ECU's clock wraps.

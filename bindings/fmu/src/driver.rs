@@ -6,7 +6,9 @@ use haptic_sim::models::driver::{ArmGains, ArmInFile, DriverParameters, Vision};
 
 use crate::error::FmuError;
 use crate::model::{About, Model, Texts};
-use crate::variable::{Kind, Role, Variable, input, limits, of_field, variable};
+use crate::variable::{
+    Kind, Role, Variable, guidance_torque, input, limits, of_field, variable, variables, wheel_angle,
+};
 use Kind::Real;
 use Role::Output;
 
@@ -59,39 +61,14 @@ static VARIABLES: [Variable; FIRST + FIELDS.len()] = {
     all
 };
 
-const OWN: [Variable; FIRST] = [
-    input(
-        "e_y_m",
-        "m",
-        limits::LATERAL_M,
-        "Lateral error at the driver's near point, positive: the target is to the left",
-    ),
-    input(
-        "e_theta_rad",
-        "rad",
-        limits::YAW_RAD,
-        "Yaw error at the driver's far point",
-    ),
-    input(
-        "wheel_angle_rad",
-        "rad",
-        limits::WHEEL_RAD,
-        "Angle of the steering wheel",
-    ),
-    input(
-        "guidance_torque_nm",
-        "N.m",
-        limits::TORQUE_NM,
-        "Guidance torque on the column",
-    ),
-    variable(
-        "driver_torque_nm",
-        Real,
-        Output,
-        "N.m",
-        "Torque of the driver on the column",
-    ),
-];
+const OWN: [Variable; FIRST] = variables! {
+    input "e_y_m", "m", limits::LATERAL_M,
+        "Lateral error at the driver's near point, positive: the target is to the left";
+    input "e_theta_rad", "rad", limits::YAW_RAD, "Yaw error at the driver's far point";
+    wheel_angle;
+    guidance_torque;
+    variable "driver_torque_nm", Real, Output, "N.m", "Torque of the driver on the column";
+};
 
 #[derive(Clone)]
 struct Driver {

@@ -56,7 +56,31 @@ pub enum FmuError {
     /// Why a state that was written cannot be reached again.
     #[error("the state cannot be driven to again: {0}")]
     State(Box<Self>),
-    /// Something out of its order, or bytes that are not this model's.
-    #[error("{0}")]
-    Other(&'static str),
+    /// A text whose bytes are not UTF-8: value reference.
+    #[error("value reference {0}: the text is not UTF-8")]
+    NotUtf8(u32),
+    /// A parameter that this model takes before the start only.
+    #[error("it cannot be set after the start")]
+    NotTunable,
+    /// A step before the start.
+    #[error("a step before the end of the initialization")]
+    NotStarted,
+    /// A step beyond the end of the course.
+    #[error("the course has ended")]
+    Ended,
+    /// Fewer values than the model has variables: their number.
+    #[error("{0} values are too few for the model's variables")]
+    MissingValues(usize),
+    /// A variable that a saved state names and the model does not have: its index.
+    #[error("the state sets variable {0}, which this model does not have")]
+    UnknownVariable(usize),
+    /// A state after a drive that is too long to be saved.
+    #[error("the drive is too long for its state to be saved as bytes; it can still be taken and given back")]
+    TooLongToSave,
+    /// Bytes that are not a state of this version of this model.
+    #[error("these bytes are not a state that this version of this model has saved")]
+    NotAState,
+    /// A saved state that is not complete.
+    #[error("the state is cut short, or of another kind")]
+    CutShort,
 }

@@ -1,7 +1,8 @@
-//! One model under way, whatever the standard: values by reference, steps of whole milliseconds, states, and refusals that
-//! leave everything as it was.
+//! A running instance of a model, for both FMI standards: values by reference, steps of whole milliseconds, saved
+//! states. A call that is refused leaves the instance as it was.
 //!
-//! A state is written as what was given to the unit since its start: whoever reads it drives another unit there, bit for bit.
+//! A state is saved as the list of all inputs since the start. Reading it drives another unit through the same
+//! inputs, to the same bits.
 
 use std::path::PathBuf;
 
@@ -16,17 +17,18 @@ use crate::variable::{Kind, Role};
 /// Longest communication step, ms: an hour.
 const MOST_STEPS: f64 = 3_600_000.0;
 
-/// Begins a state that was written; what follows is its model's token, and the version that wrote it.
+/// First line of a saved state; the token of its model and the version of the program follow.
 const FORM: &str = "haptic-guidance FMU state 1";
 
-/// Everything that evolves.
+/// Everything that changes during a run.
 pub(crate) struct State {
     values: Vec<f64>,
     texts: Texts,
     model: Box<dyn Model>,
-    /// Steps so far, 1 ms each: time is a whole number here, whatever a master adds up.
+    /// Steps so far, 1 ms each. Time is counted in whole steps, so that rounding errors in a master's sum of step
+    /// sizes do not matter.
     steps: u64,
-    /// The values that it started with, once it has.
+    /// The values at the start, once it has started.
     begun: Option<Vec<f64>>,
     /// Values of the step before.
     held: Vec<f64>,
@@ -65,7 +67,7 @@ impl State {
         }
     }
 
-    /// The parameters take hold.
+    /// Starts the model with the parameters as they are set.
     fn begin(&mut self) -> Result<(), FmuError> {
         let begun = self.values.clone();
         self.model.begin(&mut self.values, &self.texts)?;
@@ -95,7 +97,8 @@ impl State {
         Ok(())
     }
 
-    /// Takes tunable parameters that were set, which history keeps even if they are the same: the model begins anew.
+    /// Takes tunable parameters that were set: the model starts anew. History keeps them even if their values are the
+    /// same.
     fn tune(&mut self, references: &[usize]) -> Result<(), FmuError> {
         self.model.tune(&self.values)?;
         let tuned = references
@@ -105,7 +108,7 @@ impl State {
         Ok(())
     }
 
-    /// Drives to where a group of values was given, and gives them.
+    /// Drives to the step at which a group of values was set, and sets them.
     fn take(&mut self, about: &About, group: &Group) -> Result<(), FmuError> {
         while self.steps < group.step {
             self.step(about)?;
@@ -115,7 +118,7 @@ impl State {
             let variable = about
                 .variables
                 .get(reference)
-                .ok_or(FmuError::Other("a variable that there is not"))?;
+                .ok_or(FmuError::UnknownVariable(reference))?;
             self.values[reference] = value;
             if variable.role == Role::Tunable {
                 tuned.push(reference);
@@ -149,7 +152,7 @@ impl Instance {
         self.state = State::new(self.about, self.state.texts.resources.clone());
     }
 
-    /// Texts; all of them, or none.
+    /// The values of text variables; an error for one gives none.
     pub(crate) fn texts(&self, references: &[u32]) -> Result<Vec<&str>, FmuError> {
         let text = |&reference: &u32| {
             let place = self.place(reference, Kind::Text)?;
@@ -158,7 +161,7 @@ impl Instance {
         references.iter().map(text).collect()
     }
 
-    /// Sets texts; all of them, or none.
+    /// Sets text variables; an error for one sets none.
     pub(crate) fn set_texts(&mut self, given: Vec<(u32, String)>) -> Result<(), FmuError> {
         let mut texts = self.state.texts.texts.clone();
         for (reference, text) in given {
@@ -172,7 +175,7 @@ impl Instance {
         Ok(())
     }
 
-    /// The place of a variable of a type.
+    /// The index of a variable that has this type.
     fn place(&self, reference: u32, kind: Kind) -> Result<usize, FmuError> {
         let found = self.about.variables.get(reference as usize);
         found
@@ -181,7 +184,7 @@ impl Instance {
             .ok_or(FmuError::Reference(reference, kind))
     }
 
-    /// Values of one type; the reference behind the last one is the time.
+    /// The values of variables of one type. The reference after the last variable's is the time.
     pub(crate) fn get(
         &self,
         references: &[u32],
@@ -198,7 +201,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Sets all values, or none. Tunable parameters that are set together are taken together.
+    /// Sets all values; an error for one sets none. Tunable parameters that are set together take effect together.
     pub(crate) fn set(
         &mut self,
         references: &[u32],
@@ -248,16 +251,16 @@ impl Instance {
         Ok(())
     }
 
-    /// Moves by a whole number of milliseconds, or not at all; inputs hold meanwhile.
+    /// Advances by a whole number of milliseconds with constant inputs; an error leaves everything as it was.
     pub(crate) fn advance(&mut self, step_s: f64) -> Result<(), FmuError> {
         let steps = (step_s * 1e3).round();
         if !(1.0..=MOST_STEPS).contains(&steps) || (step_s * 1e3 - steps).abs() > 1e-6 {
             return Err(FmuError::StepSize(step_s));
         }
         if self.state.begun.is_none() {
-            return Err(FmuError::Other("a step before the end of the initialization"));
+            return Err(FmuError::NotStarted);
         }
-        // The step that could fail is the one to go back from; the controller's never fails.
+        // A single step that fails changes nothing; before several steps the state is saved to return to.
         let before = (steps > 1.0).then(|| self.state.clone());
         for _ in 0..steps as u32 {
             if let Err(why) = self.state.step(self.about) {
@@ -270,11 +273,9 @@ impl Instance {
         Ok(())
     }
 
-    /// A state as bytes.
+    /// A state as bytes, to be saved.
     pub(crate) fn written(&self, state: &State) -> Result<Vec<u8>, FmuError> {
-        let history = state.history.to_bytes().ok_or(FmuError::Other(
-            "the state of so long a drive cannot be written; it can be taken and given back",
-        ))?;
+        let history = state.history.to_bytes().ok_or(FmuError::TooLongToSave)?;
         let head = format!("{FORM}\n{}\n{}\n", self.about.token, env!("CARGO_PKG_VERSION"));
         let mut bytes = head.into_bytes();
         bytes.push(state.begun.is_some().into());
@@ -296,18 +297,16 @@ impl Instance {
         Ok(bytes)
     }
 
-    /// The state that was written as these bytes, by this version, of this model.
+    /// Reads a state that this version of this model has saved.
     pub(crate) fn read(&self, bytes: &[u8]) -> Result<State, FmuError> {
         let head = format!("{FORM}\n{}\n{}\n", self.about.token, env!("CARGO_PKG_VERSION"));
-        let body = bytes.strip_prefix(head.as_bytes()).ok_or(FmuError::Other(
-            "these bytes are no state that this version of this model wrote",
-        ))?;
+        let body = bytes.strip_prefix(head.as_bytes()).ok_or(FmuError::NotAState)?;
         self.driven(body)
-            .ok_or(FmuError::Other("the state is cut short, or of another kind"))?
+            .ok_or(FmuError::CutShort)?
             .map_err(|why| FmuError::State(Box::new(why)))
     }
 
-    /// Drives a unit to a state; `None` where there are not the bytes of one.
+    /// Drives a new unit to a saved state; `None` if the bytes are not one.
     fn driven(&self, body: &[u8]) -> Option<Result<State, FmuError>> {
         let mut from = Reader(body);
         let [started] = from.number()?;
@@ -343,7 +342,7 @@ impl Instance {
         if let Err(why) = state.take(self.about, &nothing) {
             return Some(Err(why));
         }
-        // What was set and not yet stepped through; what came out has to be what came out then.
+        // Values that were set after the last step; outputs have to be those of that time.
         for (place, variable) in self.about.variables.iter().enumerate() {
             if variable.role != Role::Output {
                 state.values[place] = values[place];
@@ -355,7 +354,7 @@ impl Instance {
         Some(Ok(state))
     }
 
-    /// Time that was simulated, s.
+    /// Simulated time, s.
     pub(crate) fn time_s(&self) -> f64 {
         self.state.steps as f64 * 1e-3
     }

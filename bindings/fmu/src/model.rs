@@ -47,7 +47,7 @@ pub trait Model: Send {
     /// # Errors
     /// Why they cannot be, or not now.
     fn tune(&mut self, _values: &[f64]) -> Result<(), FmuError> {
-        Err(FmuError::Other("it cannot be set now"))
+        Err(FmuError::NotTunable)
     }
 
     /// The same again, for a state that is taken.

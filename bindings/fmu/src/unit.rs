@@ -192,10 +192,10 @@ pub(crate) unsafe fn set_texts(
     let given = check_places(references.len(), values.len()).and_then(|()| {
         let pairs = references.iter().zip(values);
         // SAFETY: as the caller vouches.
-        let pairs = pairs.map(|(reference, value)| Some((*reference, unsafe { text(*value) }?)));
+        let pairs = pairs.map(|(reference, value)| (*reference, unsafe { text(*value) }));
         pairs
-            .collect::<Option<Vec<_>>>()
-            .ok_or(FmuError::Other("a text is no UTF-8"))
+            .map(|(reference, text)| Ok((reference, text.ok_or(FmuError::NotUtf8(reference))?)))
+            .collect::<Result<Vec<_>, FmuError>>()
     });
     let result = given.and_then(|given| unit.instance.set_texts(given));
     unit.answer(result)

@@ -100,6 +100,32 @@ pub mod limits {
     pub const YAW_RATE_RAD_PER_S: [f64; 2] = [-10.0, 10.0];
 }
 
+/// T_d, where others say what it is.
+pub const fn driver_torque() -> Variable {
+    let meaning = "Torque of the driver on the column";
+    input("driver_torque_nm", "N.m", limits::TORQUE_NM, meaning)
+}
+
+/// T_h, where others say what it is.
+pub const fn guidance_torque() -> Variable {
+    let meaning = "Torque of the guidance on the column";
+    input("guidance_torque_nm", "N.m", limits::TORQUE_NM, meaning)
+}
+
+/// phi, where others say what it is.
+pub const fn wheel_angle() -> Variable {
+    let meaning = "Angle of the steering wheel";
+    input("wheel_angle_rad", "rad", limits::WHEEL_RAD, meaning)
+}
+
+/// A list of variables, one line each: how it is made, and of what.
+macro_rules! variables {
+    ($($make:ident $($argument:expr),*;)*) => {
+        [$($make($($argument),*)),*]
+    };
+}
+pub(crate) use variables;
+
 /// A parameter with its start and range.
 #[must_use]
 pub const fn parameter(

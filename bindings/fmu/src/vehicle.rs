@@ -13,7 +13,9 @@ use haptic_sim::{Action, Scenario, Simulation};
 
 use crate::error::FmuError;
 use crate::model::{About, Model, Texts};
-use crate::variable::{Kind, Role, Variable, input, limits, of_field, parameter, variable};
+use crate::variable::{
+    Kind, Role, Variable, driver_torque, guidance_torque, of_field, parameter, variable, variables,
+};
 use Kind::{Real, Text};
 use Role::{Output, Parameter};
 
@@ -63,91 +65,22 @@ const ROAD: Variable = Variable {
     )
 };
 
-const OWN: [Variable; FIRST] = [
-    input(
-        "driver_torque_nm",
-        "N.m",
-        limits::TORQUE_NM,
-        "Torque of the driver on the column",
-    ),
-    input(
-        "guidance_torque_nm",
-        "N.m",
-        limits::TORQUE_NM,
-        "Torque of the guidance on the column",
-    ),
-    variable(
-        "e_y_m",
-        Real,
-        Output,
-        "m",
-        "Lateral error at the driver's near point",
-    ),
-    variable(
-        "e_theta_rad",
-        Real,
-        Output,
-        "rad",
-        "Yaw error at the driver's far point",
-    ),
-    variable(
-        "guidance_e_y_m",
-        Real,
-        Output,
-        "m",
-        "Lateral error at the guidance's near point",
-    ),
-    variable(
-        "guidance_e_theta_rad",
-        Real,
-        Output,
-        "rad",
-        "Yaw error at the guidance's far point",
-    ),
-    variable(
-        "wheel_angle_rad",
-        Real,
-        Output,
-        "rad",
-        "Angle of the steering wheel",
-    ),
-    variable(
-        "column_torque_nm",
-        Real,
-        Output,
-        "N.m",
-        "Driver torque as the column's sensor sees it",
-    ),
-    variable(
-        "motor_torque_nm",
-        Real,
-        Output,
-        "N.m",
-        "Guidance torque that acted in the last step",
-    ),
-    variable(
-        "lateral_error_m",
-        Real,
-        Output,
-        "m",
-        "Offset from the centreline, left positive; 200 values a second",
-    ),
-    variable(
-        "s_m",
-        Real,
-        Output,
-        "m",
-        "Arc length along the centreline; 200 values a second",
-    ),
-    variable("speed_m_per_s", Real, Output, "m/s", "Speed"),
-    parameter(
-        "v_m_per_s",
-        "m/s",
-        60.0 / 3.6,
-        [*SPEED_M_PER_S.start(), *SPEED_M_PER_S.end()],
-        "Speed",
-    ),
-];
+const OWN: [Variable; FIRST] = variables! {
+    driver_torque;
+    guidance_torque;
+    variable "e_y_m", Real, Output, "m", "Lateral error at the driver's near point";
+    variable "e_theta_rad", Real, Output, "rad", "Yaw error at the driver's far point";
+    variable "guidance_e_y_m", Real, Output, "m", "Lateral error at the guidance's near point";
+    variable "guidance_e_theta_rad", Real, Output, "rad", "Yaw error at the guidance's far point";
+    variable "wheel_angle_rad", Real, Output, "rad", "Angle of the steering wheel";
+    variable "column_torque_nm", Real, Output, "N.m", "Driver torque as the column's sensor sees it";
+    variable "motor_torque_nm", Real, Output, "N.m", "Guidance torque that acted in the last step";
+    variable "lateral_error_m", Real, Output, "m",
+        "Offset from the centreline, left positive; 200 values a second";
+    variable "s_m", Real, Output, "m", "Arc length along the centreline; 200 values a second";
+    variable "speed_m_per_s", Real, Output, "m/s", "Speed";
+    parameter "v_m_per_s", "m/s", 60.0 / 3.6, [*SPEED_M_PER_S.start(), *SPEED_M_PER_S.end()], "Speed";
+};
 
 /// The road that was asked for.
 fn course(texts: &Texts) -> Result<Course, FmuError> {
@@ -189,9 +122,9 @@ struct Vehicle {
 
 impl Vehicle {
     /// What there is to be seen now: a copy looks, and is thrown away.
-    fn look(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
+    fn observe(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &self.simulation else {
-            return Err(FmuError::Other("the vehicle was not started"));
+            return Err(FmuError::NotStarted);
         };
         let action = Action {
             hand_torque_nm: values[0],
@@ -226,7 +159,7 @@ impl Vehicle {
 fn ended(simulation: &Simulation<GivenTorque>) -> FmuError {
     match simulation.ending() {
         Some(Ending::Diverged { s_m }) => FmuError::LeftRoad(s_m),
-        _ => FmuError::Other("the course has ended"),
+        _ => FmuError::Ended,
     }
 }
 
@@ -240,18 +173,18 @@ impl Model for Vehicle {
             .speed(Speed::Constant(values[SPEED]))
             .vehicle(vehicle)
             .build()?;
-        self.simulation = Some(Simulation::of(
+        self.simulation = Some(Simulation::with_driver_vehicle(
             &scenario,
             PaperPair::without_driver(&scenario),
             GivenTorque::default(),
         ));
         (self.lateral_error_m, self.s_m) = (0.0, 0.0);
-        self.look(values)
+        self.observe(values)
     }
 
     fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &mut self.simulation else {
-            return Err(FmuError::Other("the vehicle was not started"));
+            return Err(FmuError::NotStarted);
         };
         simulation.guidance_mut().torque_nm = values[1];
         let action = Action {
@@ -261,7 +194,7 @@ impl Model for Vehicle {
         if simulation.step(&action).is_none() {
             return Err(ended(simulation));
         }
-        self.look(values)
+        self.observe(values)
     }
 
     fn copy(&self) -> Box<dyn Model> {

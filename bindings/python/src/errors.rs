@@ -63,31 +63,22 @@ pub(crate) fn in_keywords(py: Python<'_>, text: &str, refusal: &str) -> PyErr {
 
 /// A value outside its range.
 pub(crate) fn range(py: Python<'_>, error: &RangeError) -> PyErr {
-    let RangeError {
-        field,
-        value,
-        min,
-        max,
-        unit,
-    } = error;
+    let e = error;
     raise(
         py,
         "RangeError",
-        (error.to_string(), field.as_str(), *value, *min, *max, *unit),
+        (e.to_string(), e.field.as_str(), e.value, e.min, e.max, e.unit),
     )
 }
 
 /// A parameter of the controller outside its range.
 pub(crate) fn parameter(py: Python<'_>, error: &ParamError) -> PyErr {
-    let ParamError {
-        name,
-        value,
-        min,
-        max,
-        unit,
-        ..
-    } = *error;
-    raise(py, "RangeError", (error.to_string(), name, value, min, max, unit))
+    let e = error;
+    raise(
+        py,
+        "RangeError",
+        (e.to_string(), e.name, e.value, e.min, e.max, e.unit),
+    )
 }
 
 /// A scenario that cannot be.

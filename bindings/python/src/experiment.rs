@@ -1,6 +1,6 @@
 //! The paper's participants as drivers with a known truth.
 
-use haptic_batch::experiment::{Experiment, Plan, experiment as run};
+use haptic_batch::experiment::{Experiment, ExperimentPlan, experiment as run};
 use haptic_sim::participants::participants as published;
 use haptic_sim::scenario::{GuidanceParameters, Scenario};
 use numpy::PyArray1;
@@ -25,7 +25,7 @@ pub(crate) fn experiment<'py>(
         // In range as checked.
         within(py, "participants", number as f64, [1.0, most], "").map(|number| number as u32)
     });
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: numbers.collect::<PyResult<_>>()?,
         probe_nm,
         seed,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use haptic_batch::files::load_lane;
 use haptic_sim::input::{InputError, parse_toml};
-use haptic_sim::models::road::{DEFAULT_LANE_WIDTH_M, LaneChoice};
+use haptic_sim::models::road::{DEFAULT_LANE_WIDTH_M, LaneChoice, SEGMENT_FIELDS};
 use haptic_sim::scenario::ScenarioBuilder;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
@@ -21,7 +21,7 @@ use crate::errors;
 /// Parameters
 /// ----------
 /// course : str, path or mapping, optional
-///     ``"paper-course"``, a course file, or its content: ``{"lane_width": 3.6, "segment": [{"length": 100.0}]}``.
+///     ``"paper-course"``, a course file, or its content: ``{"lane_width_m": 3.6, "segment": [{"length_m": 100.0}]}``.
 ///     An OpenDRIVE file (.xodr) is one too; ``road``, ``lane`` and ``turn`` choose from it.
 /// speed_m_per_s : float, optional
 ///     Constant speed, 5.5 to 70.
@@ -92,20 +92,21 @@ fn complete(course: &mut Table) {
         return;
     }
     course
-        .entry("lane_width")
+        .entry("lane_width_m")
         .or_insert(Value::Float(DEFAULT_LANE_WIDTH_M));
     let Some(Value::Array(segments)) = course.get_mut("segment") else {
         return;
     };
     for segment in segments.iter_mut().filter_map(Value::as_table_mut) {
-        for quantity in ["curvature", "bank", "grade"] {
-            let ends = ["start", "end"].map(|end| format!("{quantity}_{end}"));
-            if ends.iter().any(|end| segment.contains_key(end)) {
+        // Behind the length each quantity has three fields: for the whole segment, at its start and at its end.
+        for fields in SEGMENT_FIELDS[1..].chunks_exact(3) {
+            let [whole, start, end] = [0, 1, 2].map(|i| fields[i].name);
+            if segment.contains_key(start) || segment.contains_key(end) {
                 continue;
             }
-            let constant = segment.remove(quantity).unwrap_or(Value::Float(0.0));
-            for end in ends {
-                segment.insert(end, constant.clone());
+            let constant = segment.remove(whole).unwrap_or(Value::Float(0.0));
+            for name in [start, end] {
+                segment.insert(name.into(), constant.clone());
             }
         }
     }

@@ -46,12 +46,12 @@ impl Loop {
             samples += 1.0;
             self.seen = sample;
         }
-        let ending = self.look(action);
+        let ending = self.observe(action);
         (costs.map(|sum| sum / f64::max(samples, 1.0)), ending)
     }
 
     /// The truth of this instant, which is that at the start of the next step: a clone takes it.
-    fn look(&mut self, action: &Action) -> u8 {
+    fn observe(&mut self, action: &Action) -> u8 {
         let mut ahead = self.simulation.clone();
         if let Some(sample) = ahead.step(action).and_then(|outcome| outcome.sample) {
             self.seen = sample;
@@ -147,7 +147,7 @@ impl Simulations {
             simulation: haptic_sim::Simulation::new(&scenario),
             seen: Sample::default(),
         };
-        begun.look(&Action::default());
+        begun.observe(&Action::default());
         let sample = begun.seen;
         *place = Some(begun);
         Ok((PyArray1::from_vec(py, self.observed(&sample)), self.told(&sample)))

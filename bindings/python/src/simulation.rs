@@ -249,7 +249,7 @@ impl Simulation {
             PaperPair::new(of)
         };
         Self {
-            inner: haptic_sim::Simulation::of(of, pair, AnyGuidance::of(of)),
+            inner: haptic_sim::Simulation::with_driver_vehicle(of, pair, AnyGuidance::new(of)),
             scenario,
             own_driver,
             actions: Vec::new(),

@@ -7,7 +7,7 @@ import pytest
 
 import haptic_guidance as hg
 
-SHORT = {"segment": [{"length": 300.0}, {"length": 200.0, "curvature": 0.002}]}
+SHORT = {"segment": [{"length_m": 300.0}, {"length_m": 200.0, "curvature_per_m": 0.002}]}
 
 
 def settled(engage_at_ms=600, duration_ms=900, **values):

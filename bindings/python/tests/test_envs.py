@@ -15,7 +15,7 @@ from gymnasium.utils.env_match import check_environments_match  # noqa: E402
 
 from haptic_guidance import envs  # noqa: E402
 
-SHORT = {"segment": [{"length": 150.0}, {"length": 100.0, "curvature": 0.002}]}
+SHORT = {"segment": [{"length_m": 150.0}, {"length_m": 100.0, "curvature_per_m": 0.002}]}
 NAMES = ("haptic_guidance/Driver-v0", "haptic_guidance/Authority-v0")
 
 
@@ -83,7 +83,7 @@ def test_a_hand_that_looks_ahead_keeps_the_lane_and_none_does_not():
 
 
 def test_authority_is_the_share_of_the_guidance():
-    bend = hg.Scenario(condition="high", course={"segment": [{"length": 300.0, "curvature": 0.002}]})
+    bend = hg.Scenario(condition="high", course={"segment": [{"length_m": 300.0, "curvature_per_m": 0.002}]})
 
     def torque(authority):
         env = envs.AuthorityEnv(bend)
@@ -165,7 +165,7 @@ def test_a_function_makes_a_scenario_for_each_drive():
 
 
 def test_a_step_of_many_releases_the_interpreter():
-    vector = envs.AuthorityVectorEnv(64, hg.Scenario(course={"segment": [{"length": 100_000.0}]}), period_ms=10_000)
+    vector = envs.AuthorityVectorEnv(64, hg.Scenario(course={"segment": [{"length_m": 100_000.0}]}), period_ms=10_000)
     vector.reset(seed=1)
     turns, stop = [], threading.Event()
 

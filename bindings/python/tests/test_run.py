@@ -15,7 +15,7 @@ import pytest
 import haptic_guidance as hg
 
 DATA = Path(__file__).parents[3] / "tests" / "data"
-SHORT = {"segment": [{"length": 300.0}, {"length": 60.0, "curvature_start": 0.0, "curvature_end": 0.002}, {"length": 200.0, "curvature": 0.002}]}
+SHORT = {"segment": [{"length_m": 300.0}, {"length_m": 60.0, "curvature_start_per_m": 0.0, "curvature_end_per_m": 0.002}, {"length_m": 200.0, "curvature_per_m": 0.002}]}
 
 
 def test_a_run_is_the_curve_of_an_independent_program():
@@ -224,7 +224,7 @@ def test_what_is_no_experiment_is_refused(arguments, error, says):
 
 def test_ctrl_c_ends_a_long_call_and_the_gil_is_free():
     # 200 km at 20 km/h: ten hours of driving.
-    long = hg.Scenario(course={"segment": [{"length": 200_000.0}]}, speed_m_per_s=20 / 3.6)
+    long = hg.Scenario(course={"segment": [{"length_m": 200_000.0}]}, speed_m_per_s=20 / 3.6)
     turns, begun = [], time.monotonic()
 
     def interrupt():

@@ -10,7 +10,7 @@ import pytest
 import haptic_guidance as hg
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-COURSE = {"lane_width": 3.5, "segment": [{"length": 400.0}, {"length": 200.0, "curvature": 0.002}]}
+COURSE = {"lane_width_m": 3.5, "segment": [{"length_m": 400.0}, {"length_m": 200.0, "curvature_per_m": 0.002}]}
 
 
 def test_the_file_with_every_field_holds_the_defaults():
@@ -34,7 +34,7 @@ def test_numbers_of_numpy_are_numbers():
 def test_a_speed_that_changes_is_a_mapping_or_a_table():
     # 20 m/s for 5 s, 2 m/s2 less for 5 s: 100 and 75 m; the far point, 10 m ahead, ends the rest of 300 m at 290.
     speed = {"time_s": [5, 10], "speed_m_per_s": np.array([20.0, 10.0]).tolist()}
-    braking = hg.Scenario(course={"segment": [{"length": 300.0}]}, speed=speed)
+    braking = hg.Scenario(course={"segment": [{"length_m": 300.0}]}, speed=speed)
     assert (braking.speed_kmh, braking.speed_m_per_s) == (72.0, 20.0)
     assert braking.duration_s == pytest.approx(21.5)
     assert pickle.loads(pickle.dumps(braking)) == braking == hg.Scenario.from_toml(braking.to_toml())
@@ -44,7 +44,7 @@ def test_a_speed_that_changes_is_a_mapping_or_a_table():
     assert braking == braking.replace(speed={"time_s": (5, 10), "speed_m_per_s": (20.0, 10.0)}), "a tuple is as good as a list"
     by_place = braking.replace(speed={"place_m": [50, 200], "speed_m_per_s": [20.0, 10.0]})
     assert by_place.to_dict()["speed"] == {"place_m": [50, 200], "speed_m_per_s": [20.0, 10.0]}
-    assert by_place.replace(speed_m_per_s=60 / 3.6) == hg.Scenario(course={"segment": [{"length": 300.0}]})
+    assert by_place.replace(speed_m_per_s=60 / 3.6) == hg.Scenario(course={"segment": [{"length_m": 300.0}]})
     with pytest.raises(hg.RangeError, match="acceleration to point 2 = -11.111 m/s2"):
         hg.Scenario(speed={"time_s": [0, 1], "speed_m_per_s": [27.77777777777778, 16.666666666666668]})
     with pytest.raises(hg.InputError, match="point 2"):
@@ -117,7 +117,7 @@ def test_nan_is_out_of_range():
         ({"driver": {"t_p_s": object()}}, "driver.t_p_s: a object is no number"),
         ({"course": "no-such.toml"}, "no-such.toml"),
         ({"condition": "manual", "failure": {"kind": "torque"}}, "manual"),
-        ({"course": {"segment": [{"length": 100, "curvature": 1.0}]}}, "segment 1: curvature = 1"),
+        ({"course": {"segment": [{"length_m": 100, "curvature_per_m": 1.0}]}}, "segment 1: curvature_per_m = 1"),
     ],
 )
 def test_what_makes_no_scenario_is_refused_by_name(fields, says):
@@ -143,9 +143,9 @@ def test_everything_public_is_documented():
 
 
 def test_a_course_may_leave_out_what_a_course_file_may():
-    short = {"segment": [{"length": 300.0}, {"length": 100.0, "curvature": 0.001}]}
-    long = {"name": "course", "lane_width": 3.6, "segment": [
-        {"length": 300.0, "curvature_start": 0.0, "curvature_end": 0.0},
-        {"length": 100.0, "curvature_start": 0.001, "curvature_end": 0.001},
+    short = {"segment": [{"length_m": 300.0}, {"length_m": 100.0, "curvature_per_m": 0.001}]}
+    long = {"name": "course", "lane_width_m": 3.6, "segment": [
+        {"length_m": 300.0, "curvature_start_per_m": 0.0, "curvature_end_per_m": 0.0},
+        {"length_m": 100.0, "curvature_start_per_m": 0.001, "curvature_end_per_m": 0.001},
     ]}  # fmt: skip
     assert hg.Scenario(course=short) == hg.Scenario(course=long)

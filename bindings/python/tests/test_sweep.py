@@ -20,15 +20,8 @@ design = "sobol"
 kind = "torque"
 [scenario.course]
 name = "one curve"
-lane_width = 3.6
-[[scenario.course.segment]]
-length = 60.0
-curvature_start = 0.0
-curvature_end = 0.0
-[[scenario.course.segment]]
-length = 140.0
-curvature_start = 0.003
-curvature_end = 0.003
+lane_width_m = 3.6
+segment = [{ length_m = 60.0 }, { length_m = 140.0, curvature_per_m = 0.003 }]
 [vary]
 "driver.t_p_s" = { uniform = [0.1, 0.5] }
 "failure.time_s" = { uniform = [4, 8] }
@@ -58,10 +51,10 @@ def test_rows_are_the_runs_of_their_scenarios(spec, tmp_path):
         seed=int(row["seed"]),
         course={
             "name": "one curve",
-            "lane_width": 3.6,
+            "lane_width_m": 3.6,
             "segment": [
-                {"length": 60.0, "curvature_start": 0.0, "curvature_end": 0.0},
-                {"length": 140.0, "curvature_start": 0.003, "curvature_end": 0.003},
+                {"length_m": 60.0, "curvature_start_per_m": 0.0, "curvature_end_per_m": 0.0},
+                {"length_m": 140.0, "curvature_start_per_m": 0.003, "curvature_end_per_m": 0.003},
             ],
         },
     )

@@ -71,7 +71,7 @@ import numpy as np
 import haptic_guidance as hg
 
 scenario = hg.Scenario(speed_m_per_s=20, condition="high", driver={"t_p_s": 0.3, "k_hg": 0.4}, failure={"kind": "torque", "time_s": 20})
-road = hg.Scenario(course={"segment": [{"length": 300.0}]}, speed={"time_s": [0, 10], "speed_m_per_s": [16.7, 13.9]}, tolerances={"car": 3})
+road = hg.Scenario(course={"segment": [{"length_m": 300.0}]}, speed={"time_s": [0, 10], "speed_m_per_s": [16.7, 13.9]}, tolerances={"car": 3})
 run: hg.Run = hg.simulate(scenario.replace(sensors="exact", guidance={"probe": True}))
 errors: np.ndarray = run["lateral_error_m"]
 fit: hg.Fit = hg.identify(run, also=[run, "drive.csv"], max_gap=0.1, preprocessing=False, lane_smoothing=False)
@@ -87,7 +87,7 @@ hg.Scenario(condition="hihg")  # condition
 hg.Scenario(driver={"t_pp": 0.3})  # t_pp
 hg.Scenario(world={"tyres": "round"})  # tyres
 hg.Scenario(driver={"t_p_s": "slow"})  # t_p
-hg.Scenario(course={"segment": [{"curvature": 0.1}]})  # course
+hg.Scenario(course={"segment": [{"curvature_per_m": 0.1}]})  # course
 scenario.replace(seed="x")  # seed
 hg.identify(run, maxgap=0.1)  # maxgap
 hg.identify(run, also=3)  # also

@@ -10,9 +10,9 @@ import haptic_guidance as hg
 # A left curve of a radius of 800 m, held for a minute at 60 km/h.
 HELD = {
     "segment": [
-        {"length": 200.0},
-        {"length": 100.0, "curvature_start": 0.0, "curvature_end": 0.00125},
-        {"length": 1000.0, "curvature": 0.00125},
+        {"length_m": 200.0},
+        {"length_m": 100.0, "curvature_start_per_m": 0.0, "curvature_end_per_m": 0.00125},
+        {"length_m": 1000.0, "curvature_per_m": 0.00125},
     ]
 }
 # A camera that is blind for 1.5 s now and then: the ECU hands over after a second of that.
@@ -107,12 +107,12 @@ def test_an_evaluation_with_unguided_runs_is_not_held():
 def test_a_sweep_has_columns_for_it(tmp_path):
     pyarrow_parquet = pytest.importorskip("pyarrow.parquet")
     segments = "".join(
-        f"[[scenario.course.segment]]\nlength = {length}\ncurvature_start = {start}\ncurvature_end = {end}\n"
+        f"[[scenario.course.segment]]\nlength_m = {length}\ncurvature_start_per_m = {start}\ncurvature_end_per_m = {end}\n"
         for length, start, end in ((200.0, 0.0, 0.0), (400.0, 0.00125, 0.00125))
     )
     spec = tmp_path / "sweep.toml"
     spec.write_text(
-        'metrics = ["sdlp_m"]\n[scenario.course]\nname = "c"\nlane_width = 3.6\n'
+        'metrics = ["sdlp_m"]\n[scenario.course]\nname = "c"\nlane_width_m = 3.6\n'
         + segments
         + '[scenario.sensor_errors]\ndropout_duration_s = 1.5\n[vary]\ncondition = ["manual", "high"]\n"sensor_errors.dropout_rate_per_s" = [0, 0.2]\n'
     )

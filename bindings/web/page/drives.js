@@ -4,9 +4,9 @@ const EYES = { a_1: 0.1, a_2: 0.05, a_3: 3.7 }, FIELDS = { a_1: "a_1_rad_per_m",
 const PLAIN = { driver: "own", ...EYES, t_p: 0.3, k_hg: 0.5, k_d: 3, speed: 60, guided: true, k_1: 0.25, law: "shipping", fail: "none", at: 70, probe: false,
   remnant: 0, course: "paper-course" };
 // Roads of the page's own: the first bend within 8 s at 60 km/h.
-const ramp = (length, from, to) => `{length = ${length}, curvature_start = ${from}, curvature_end = ${to}}`;
+const ramp = (length, from, to) => `{length_m = ${length}, curvature_start_per_m = ${from}, curvature_end_per_m = ${to}}`;
 const bend = (length, curvature) => ramp(length, curvature, curvature);
-const inline = (name, segments) => `{name = "${name}", lane_width = 3.6, segment = [${segments.join(", ")}]}`;
+const inline = (name, segments) => `{name = "${name}", lane_width_m = 3.6, segment = [${segments.join(", ")}]}`;
 const round = (radius, arc, ease) => { const c = 1 / radius; return [ramp(ease, 0, c), bend(arc, c), ramp(ease, c, 0)]; };
 const COURSES = {
   "paper-course": null,

@@ -26,7 +26,7 @@ struct Lab {
 }
 
 /// An answer for the page, or the error whose text it shows.
-type Answer<T> = Result<T, Box<dyn std::error::Error>>;
+type LabResult<T> = Result<T, Box<dyn std::error::Error>>;
 
 static LAB: Mutex<Lab> = Mutex::new(Lab {
     input: Vec::new(),
@@ -41,7 +41,7 @@ fn lab() -> MutexGuard<'static, Lab> {
 }
 
 /// Does what it says with the text that was written; puts the answer, or what is wrong, where the page reads it.
-fn answer(of: impl FnOnce(&mut Lab, &str) -> Answer<String>) -> u32 {
+fn answer(of: impl FnOnce(&mut Lab, &str) -> LabResult<String>) -> u32 {
     let mut lab = lab();
     let input = std::mem::take(&mut lab.input);
     let result = String::from_utf8(input)

@@ -8,10 +8,10 @@ use haptic_core::controller::config::Setup;
 use haptic_core::ecu::Ecu;
 use haptic_core::quantity::Instant;
 
-use crate::Answer;
+use crate::LabResult;
 
 /// Lines of `t_us id data` in order of time; what the ECU sends, in the same form, a step for each time.
-pub(crate) fn replay(bus: &str) -> Answer<String> {
+pub(crate) fn replay(bus: &str) -> LabResult<String> {
     let mut ecu = Ecu::engaged(&Setup::PAPER, Instant::from_us(0));
     let mut sent = String::new();
     let mut lines = bus.lines().peekable();
@@ -45,7 +45,7 @@ fn time(line: &str) -> Option<u64> {
     line.split(' ').next()?.parse().ok()
 }
 
-fn frame(line: &str) -> Answer<Frame> {
+fn frame(line: &str) -> LabResult<Frame> {
     let refuse = || format!("{line}: no frame");
     let mut words = line.split(' ').skip(1);
     let (id, data) = words.next().zip(words.next()).ok_or_else(refuse)?;

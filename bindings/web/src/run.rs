@@ -14,7 +14,7 @@ use haptic_sim::scenario::{Condition, FailureKind};
 use haptic_sim::simulation::{Ending, Outcome, SAMPLE_RATE_HZ};
 use haptic_sim::{Action, Scenario, Simulation};
 
-use crate::Answer;
+use crate::LabResult;
 
 /// Numbers of [`Record::now`], by their places: time, arc length, lateral error, heading error, wheel angle, driver torque,
 /// applied torque, mode, limit, warning, e_y and e_theta at the driver's points, speed, wheel rate, steps, diverged, K_hg as
@@ -51,7 +51,7 @@ impl Run {
         courses: &[(String, Course)],
         law: Option<usize>,
         person: bool,
-    ) -> Answer<Self> {
+    ) -> LabResult<Self> {
         let scenario = Scenario::from_toml("this page", toml, |name, _| {
             let known = courses.iter().find(|(known, _)| known == name);
             let missing = || InputError::new(name, "this road is not in the page: drop its file on it");
@@ -65,12 +65,14 @@ impl Run {
         };
         let simulation = match law.filter(|_| scenario.condition() != Condition::Manual) {
             None => {
-                let guidance = AnyGuidance::of(&scenario);
-                Loop::Shipping(Box::new(Simulation::of(&scenario, pair, guidance)))
+                let guidance = AnyGuidance::new(&scenario);
+                Loop::Shipping(Box::new(Simulation::with_driver_vehicle(
+                    &scenario, pair, guidance,
+                )))
             }
             Some(place) => {
                 let law = OwnLaw::new(&scenario, law_at(place, &scenario)?);
-                Loop::Law(Box::new(Simulation::of(&scenario, pair, law)))
+                Loop::Law(Box::new(Simulation::with_driver_vehicle(&scenario, pair, law)))
             }
         };
         Ok(Self {
@@ -192,14 +194,14 @@ impl Record {
         }
     }
 
-    pub(crate) fn csv(&self) -> Answer<String> {
+    pub(crate) fn csv(&self) -> LabResult<String> {
         let mut csv = Vec::new();
         self.trace.write_csv(&mut csv)?;
         Ok(String::from_utf8(csv)?)
     }
 }
 
-fn law_at(place: usize, scenario: &Scenario) -> Answer<Box<dyn Law>> {
+fn law_at(place: usize, scenario: &Scenario) -> LabResult<Box<dyn Law>> {
     let made = match LAWS.get(place) {
         None => return Ok(Box::new(PageLaw)),
         Some(kind) => match &kind.make {

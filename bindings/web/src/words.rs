@@ -5,7 +5,7 @@ use haptic_analysis::identify::{DriveLog, Identification, Options, Reason, ident
 use haptic_sim::participants::{PublishedDriver, participants};
 use serde_json::{Value, json};
 
-use crate::Answer;
+use crate::LabResult;
 
 /// What the columns of a log are to a driver.
 const COLUMNS: [(&str, &str); 5] = [
@@ -17,7 +17,7 @@ const COLUMNS: [(&str, &str); 5] = [
 ];
 
 /// Who drove a log: fit, parameters with their intervals and the paper's fourteen beside them, notes.
-pub(crate) fn identified(csv: &str, manual: bool) -> Answer<String> {
+pub(crate) fn identified(csv: &str, manual: bool) -> LabResult<String> {
     let log = DriveLog::read(csv.as_bytes(), manual).map_err(|why| refusal(&why.to_string(), csv))?;
     let options = Options::given(manual, &[])?;
     let found = identify_with_noise_model(&log, &options);

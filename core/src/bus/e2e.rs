@@ -9,10 +9,10 @@
 //! detected, from 16 bytes on only single ones (`core/tests/e2e.rs`): a longer message that moves a torque needs a longer CRC
 //! or a MAC.
 //!
-//! The receiver rejects one bad frame and goes on; a sender that was silent past its time-out has to show
-//! three clean frames in a row before it is trusted again. Terms: *delta* is the counter's step from the
-//! last accepted frame, modulo 16; *clean* is a frame that is intact, the next in count, and in range. (A preview
-//! that says of itself that it is not valid is clean: its sender is heard, and honest.)
+//! The receiver rejects a bad frame and continues with the next. A sender that was silent beyond its time-out has to
+//! send three clean frames in a row before it is trusted again. Terms: *delta* is the counter's step from the last
+//! accepted frame, modulo 16; *clean* is a frame that is intact, the next in count, and in range. (A lane preview
+//! that is marked as not valid counts as clean.)
 
 use crc::{CRC_8_AUTOSAR, Crc};
 
@@ -150,20 +150,20 @@ impl Reject {
     }
 }
 
-/// One receiver's memory of a sender. In bytes, so that whoever keeps it twice has half a word to check.
+/// What a receiver remembers of one sender, in two bytes, so that a second copy costs half a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReceiverState {
     /// Counter of the last frame, [`NONE`] before the first.
     pub(crate) last: u8,
-    /// Clean frames in a row, as far as they matter.
+    /// Clean frames in a row, up to [`CLEAN_FRAMES_TO_TRUST`].
     pub(crate) clean: u8,
 }
 
-/// No counter has been heard.
+/// The value of `last` before any counter was received.
 const NONE: u8 = 16;
 
 impl ReceiverState {
-    /// A sender not yet heard.
+    /// A sender that has sent nothing yet.
     pub const NEW: Self = Self { last: NONE, clean: 0 };
     /// A sender that is trusted from its first frame on, for studies that start in mid-drive.
     pub const TRUSTED: Self = Self {
@@ -177,8 +177,8 @@ impl ReceiverState {
         self.clean >= CLEAN_FRAMES_TO_TRUST
     }
 
-    /// Judges a frame and remembers its counter. `max_delta` is the largest step that lost frames explain
-    /// within the message's time-out.
+    /// Checks a frame and stores its counter. `max_delta` is the largest step of the counter that lost frames within
+    /// the message's time-out explain.
     ///
     /// # Errors
     /// Why the frame must not be used.
@@ -201,7 +201,8 @@ impl ReceiverState {
         }
         match delta {
             Some(0) => Err(Reject::Repeated),
-            // A frame out of order must not move the counter: the next one in order is still good.
+            // A frame out of order must not change the stored counter, so that the next one in order is still
+            // accepted.
             Some(delta) if delta > max_delta => Err(Reject::Jump),
             _ => {
                 self.last = counter;

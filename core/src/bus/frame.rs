@@ -10,7 +10,7 @@ pub struct CanFrame<const N: usize> {
     data: [u8; N],
 }
 
-/// A classic frame, up to eight bytes: all this bus carries today.
+/// A classic frame of up to eight bytes: this bus carries no other.
 pub type Frame = CanFrame<8>;
 
 /// A frame of CAN FD, up to 64 bytes.
@@ -73,7 +73,7 @@ impl<const N: usize> CanFrame<N> {
         self.data.first_chunk().filter(|_| usize::from(self.len) == L)
     }
 
-    /// The whole buffer; bytes beyond the length are zero.
+    /// The whole buffer; bytes beyond the length of the frame are zero.
     pub(crate) const fn bytes(&self) -> &[u8; N] {
         &self.data
     }

@@ -42,7 +42,7 @@ pub enum Line {
 }
 
 impl Line {
-    /// What the other side expects back.
+    /// The answer that the other side expects.
     #[must_use]
     pub const fn answer(self) -> &'static [u8] {
         match self {

@@ -1,6 +1,6 @@
-//! The readings of the blocks, averaged: all since the start or the last change, and how far to trust their mean.
+//! Averages the readings of the blocks since the start or the last change, and estimates the deviation of their mean.
 //!
-//! The work on a reading is cut into pieces, of which a step does one. Not here: what a reading is.
+//! The work on a reading is divided into pieces, of which each step does one. Not here: how a reading is computed.
 
 #![expect(
     clippy::float_arithmetic,
@@ -13,23 +13,25 @@ use micromath::F32Ext;
 use super::Reading;
 use crate::quantity::Ratio;
 
-/// What is left to do for the last block.
+/// The work that is left for the last block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Work {
     Nothing,
     /// Take a reading into the average.
     Average(f32),
-    /// Look for a change before the last `length` readings, whose sum is `sum`; the best so far.
+    /// Test for a change before the last `length` readings, whose sum is `sum`; `best` is the most significant change
+    /// so far.
     Compare {
         length: u8,
         sum: f32,
         best: Change,
     },
-    /// Drop the memory before the change, if it was one, and report.
+    /// Drop the readings before the change, if it is significant, and report.
     Conclude(Change),
 }
 
-/// A supposed change: its significance, 1 where it is one, and the mean and the number of readings since.
+/// A possible change: its significance, which is above 1 for a real one, and the mean and the number of the readings
+/// after it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Change {
     significance: f32,
@@ -37,7 +39,7 @@ pub(super) struct Change {
     count: u8,
 }
 
-/// The readings so far.
+/// The average of the readings so far.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Average {
     mean: f32,
@@ -51,37 +53,38 @@ pub(super) struct Average {
     recent: Deque<f32, LONGEST>,
 }
 
-/// The average forgets beyond so many readings (40 s).
+/// Memory of the average in readings (40 s).
 const MEMORY: u8 = 40;
-/// No report before so many: 6 s.
+/// The first report comes after this many readings: 6 s.
 const FIRST_REPORT: u8 = 5;
-/// A change is looked for among so many of the last readings.
+/// The longest run of last readings that is tested for a change.
 const LONGEST: usize = 14;
 /// The fewest readings on either side of a change.
 const SHORTEST: u8 = 3;
-/// How many standard deviations the means before and after a change differ by, at least; more where few
-/// readings are all there is. Noise alone drops the memory once in 15 minutes. Squared.
+/// How many standard deviations the means before and after a change differ by at least, squared; more where there are
+/// few readings after it. Noise alone triggers this once in 15 minutes.
 const CHANGE: f32 = 3.1 * 3.1;
 const CHANGE_OF_FEW: f32 = 3.8 * 3.8;
-/// So many are few no longer.
+/// From this number on readings are no longer few.
 const FEW: u8 = 6;
-/// Variance of a reading before the first one, at the amplitude of [`PRIOR_NM`], and how many readings this
-/// prior counts for: 0.1 N.m of driver noise gives 0.15 to 0.2.
+/// Prior of the variance of a reading, with a probe of [`PRIOR_NM`], and how many readings this prior counts as. With
+/// 0.1 N.m of driver noise the deviation of a reading is 0.15 to 0.2.
 const PRIOR_VARIANCE: f32 = 0.18 * 0.18;
 const PRIOR_NM: f32 = 0.2;
 const PRIOR_WEIGHT: f32 = 8.0;
-/// The spread is remembered over so many readings.
+/// Memory of the variance in readings.
 const SPREAD_MEMORY: f32 = 60.0;
-/// An innovation counts for at most this many variances: a change is no spread.
+/// A squared deviation from the mean counts as at most this many variances, so that a change of K_hg does not enlarge
+/// the variance.
 const OUTLIER: f32 = 9.0;
-/// Overlapping neighbours are correlated: the variance of a mean of n readings is 1.2/n of one's, and that of
-/// the difference of two means 1.25 times what independent readings would have.
+/// Neighbouring blocks overlap, so their readings are correlated. The variance of the mean of n readings is 1.2/n
+/// times that of one, and the variance of the difference of two means is 1.25 times that with independent readings.
 const OVERLAP_MEAN: f32 = 1.2;
 const OVERLAP_DIFFERENCE: f32 = 1.25;
-/// Deviation that no averaging takes away: the driver's eyes do play a small part.
+/// Variance that averaging does not reduce: the driver's eyes have a small influence after all.
 const FLOOR: f32 = 0.02 * 0.02;
 impl Average {
-    /// No reading yet, from a probe of this amplitude.
+    /// An average without readings, for a probe of this amplitude.
     pub(super) fn new(amplitude_nm: f32) -> Self {
         let scale = PRIOR_NM / amplitude_nm;
         Self {
@@ -98,12 +101,12 @@ impl Average {
         if self.recent.is_full() {
             self.recent.pop_front();
         }
-        // There is room: the oldest has just left.
+        // There is room, as the oldest was removed.
         let _ = self.recent.push_back(reading);
         let count = f32::from(self.count);
         let innovation = reading - self.mean;
         if self.count > 0 {
-            // Less the spread of the mean itself.
+            // Corrected for the variance of the mean itself.
             let square = innovation * innovation * count / (count + 1.0);
             let square = square.min(OUTLIER * self.variance());
             let kept = 1.0 - 1.0 / SPREAD_MEMORY;
@@ -120,7 +123,7 @@ impl Average {
         self.squares / self.weights
     }
 
-    /// One more reading to the supposed new ones, and how significant a change before it would be.
+    /// Counts one more reading to those after a possible change, and tests how significant that change is.
     pub(super) fn compare(&self, length: u8, sum: f32, best: Change) -> Work {
         let next = self.recent.iter().rev().nth(usize::from(length));
         let length = length.saturating_add(1);
@@ -149,13 +152,13 @@ impl Average {
         Work::Compare { length, sum, best }
     }
 
-    /// The report; by the share `muscle` of K_hg it may be wrong because of the arm's t_nms.
+    /// Reports the estimate. `muscle` is the share of K_hg by which it may be wrong because of the arm's t_nms.
     pub(super) fn conclude(&mut self, change: Change, muscle: f32) -> Option<Reading> {
         if change.significance > 1.0 {
             (self.mean, self.count) = (change.mean, change.count);
         }
         let variance = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR;
-        // The other error is no noise: it is added to it, not to its square.
+        // The error of the arm is not noise, so it is added to the deviation, not to the variance.
         let deviation = root(variance) + muscle * self.mean.abs();
         (self.total >= FIRST_REPORT).then(|| Reading {
             k_hg: Ratio::from_f32(self.mean),
@@ -164,8 +167,8 @@ impl Average {
     }
 }
 
-/// The square root of what is above zero: never too small, and at most 0.18 % too large. micromath's is up to 6.1 % too
-/// large; a step of Heron's rule leaves half of that squared.
+/// The square root of a positive number: never too small, and at most 0.18 % too large. micromath's root is up to 6.1
+/// % too large; one step of Heron's rule leaves half the square of that error.
 fn root(square: f32) -> f32 {
     let near = F32Ext::sqrt(square);
     0.5 * (near + square / near)

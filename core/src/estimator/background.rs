@@ -1,35 +1,35 @@
-//! The advisory part of a step: the live estimate of K_hg, and the telemetry that reports it with
-//! the probe. The ECU fills it in every step; it works when the torque is already on its way.
+//! The advisory part of a step: the live estimate of K_hg, and the telemetry that reports it with the probe. Every
+//! step hands over its sample; the work is done after the torque has left.
 //!
-//! It moves nothing, so that it may use f32, and its state is not kept twice: a flipped bit spoils an
-//! estimate at most until the next probe.
+//! No torque depends on it, so it may use f32, and its state is not kept twice: a flipped bit spoils an estimate at
+//! most until the next probe.
 
 use crate::bus::Frame;
 use crate::bus::messages::{Message, Telemetry};
 use crate::estimator::{Estimator, EstimatorState, Sample};
 use crate::quantity::Torque;
 
-/// Telemetry comes every so many steps, or up to [`PATIENCE`] later.
+/// Steps between two telemetry frames; a frame may be up to [`PATIENCE`] steps late.
 const TURN: u32 = 20;
 /// See [`TURN`].
 const PATIENCE: u32 = 3;
 
-/// What the last step left to think about, and what came of it so far.
+/// The samples that the last steps handed over, and the estimate so far.
 #[derive(Debug, Clone)]
 pub(crate) struct Background {
     estimator: Estimator,
-    /// While there is a probe.
+    /// The state of the estimate, while there is a probe.
     k_hg: Option<EstimatorState>,
-    /// What the last step saw, and the one before.
+    /// The sample of the last step, and that of the step before.
     samples: [Option<Sample>; 2],
     probe: Option<Torque>,
     steps: u32,
-    /// The telemetry's turn has come.
+    /// Whether a telemetry frame is due.
     due: bool,
 }
 
 impl Background {
-    /// Nothing seen yet.
+    /// The state before the first step.
     pub(crate) const fn new(estimator: Estimator) -> Self {
         Self {
             estimator,
@@ -41,7 +41,7 @@ impl Background {
         }
     }
 
-    /// Takes what a step saw: the column's sample, if it was new, and the probe, if there is one.
+    /// Takes the column's sample of a step, if it was new, and the probe, if there is one.
     pub(crate) fn take(&mut self, sample: Option<Sample>, probe: Option<Torque>) {
         let [new, before] = &mut self.samples;
         *before = *new;
@@ -49,20 +49,21 @@ impl Background {
         self.probe = probe;
     }
 
-    /// The work for one step, and the telemetry when it is its turn. A step that took a new sample has decoded and
-    /// checked it: the estimator gets it one step later, and the telemetry stands back for up to [`PATIENCE`].
+    /// Does the work for one step, and returns a telemetry frame when one is due. A step with a new sample has
+    /// decoded and checked it already, so the estimator takes it one step later, and telemetry waits for up to
+    /// [`PATIENCE`] steps.
     #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]
     pub(crate) fn step(&mut self) -> Option<Frame> {
         let [new, sample] = &self.samples;
         let mut is_free = new.is_none();
         match (&mut self.k_hg, self.probe) {
             (Some(state), Some(_)) => self.estimator.step(state, sample.as_ref()),
-            // To begin is work enough for a step.
+            // Starting the estimate is all that this step does.
             (none, Some(_)) => {
                 *none = Some(self.estimator.start());
                 is_free = false;
             }
-            // What a driver did before is no evidence of what the driver does now.
+            // Earlier readings are no evidence of how the driver drives now.
             (state, None) => *state = None,
         }
         let steps = self.steps;

@@ -1,14 +1,15 @@
-//! How much the driver relies on the guidance, live: K_hg of equation (8), from the probe.
+//! Estimates while driving how much the driver relies on the guidance: K_hg of equation (8), from the probe.
 //!
-//! At the probe's frequency the driver's eyes and the vehicle play no part, so equation (8) leaves
-//! `K_hg = -((1 + j*w*t_nms)*T_d + K_nms*phi)/T_h`, each symbol the Fourier coefficient of what was really
-//! measured and applied. It is taken over *blocks*: Hann windows of a whole number of probe periods, about
-//! 2 s, each overlapping the last by half. The real part of a block's ratio is one noisy reading.
+//! At the probe's frequency the driver's eyes and the vehicle's movement hardly matter, so equation (8) becomes
+//! `K_hg = -((1 + j*w*t_nms)*T_d + K_nms*phi)/T_h`, where each symbol is the Fourier coefficient of the measured or
+//! applied signal. The coefficients are taken over *blocks*: Hann windows of a whole number of probe periods, about 2
+//! s long, each overlapping the last by half. The real part of the ratio over one block is one noisy *reading* of
+//! K_hg.
 //!
-//! Readings are averaged: all since the start or the last change, of late the last 40 or so. A *change* is
-//! declared when the mean of the last 3 to 14 readings is too far from the mean before them (a generalised
-//! likelihood ratio); the memory before it is dropped. The spread of the readings, which the driver's own
-//! noise decides, is estimated with a prior, and gives the deviation of the estimate.
+//! The estimate is the average of all readings since the start or since the last change, with a memory of about 40
+//! readings. A *change* is declared when the mean of the last 3 to 14 readings differs too much from the mean before
+//! them (a generalised likelihood ratio); the readings before it are then dropped. The spread of the readings, which
+//! comes from the driver's own noise, is estimated with a prior, and gives the standard deviation of the estimate.
 //!
 //! | figure, pooled over 14 drivers with 0.1 N.m of noise, 0.2 N.m at 2.5 Hz | after 10 s | after 30 s |
 //! |---|---|---|
@@ -18,17 +19,20 @@
 //!
 //! (`host-sim reliance` makes this table; `tests/reliance.rs` asserts a part of it.)
 //!
-//! What is assumed: K_nms, and t_nms. An arm with another t_nms, 0.06 to 0.15 s, makes an error in proportion to K_hg; the
-//! deviation that is reported is that of the noise plus the largest such error. So it is wide for drivers who resist: 0.39 of K_hg at
-//! 2.5 Hz. (An identification from a whole record tells t_nms too.) A driver who relies on the guidance fully, K_hg 0,
-//! is told from hands off by T_d itself: where it stays within 0.012 N.m for half a block there are no hands, and no reading.
+//! K_nms and t_nms of the driver's arm are assumed. An arm with another t_nms, 0.06 to 0.15 s, causes an error in
+//! proportion to K_hg; the reported deviation is that of the noise plus the largest such error. So it is large for
+//! drivers who resist the guidance: 0.39 of K_hg at 2.5 Hz. (An identification from a whole recording estimates t_nms
+//! too.) A driver who relies fully on the guidance, K_hg 0, is distinguished from hands off by T_d: where T_d stays
+//! within 0.012 N.m for half a block, nobody holds the wheel, and there is no reading.
 //!
-//! Advisory, and outside the torque path: it computes in f32, with additions, multiplications and divisions
-//! only, none of which is fused, so that host and target agree to the last bit; the one root is micromath's, which is such arithmetic too. The work at the end of a
-//! block is spread over later steps without a sample, one comparison each: with a sample in every other step no
-//! step costs 400 instructions (`tests/pil.rs` counts them on the target).
+//! The estimate is advisory and outside the torque path. It is computed in f32 with additions, multiplications and
+//! divisions only, none of them fused, so that host and target agree to the last bit; the one square root is
+//! micromath's, which uses the same operations. The work at the end of a block is spread over later steps without a
+//! sample, one comparison each. With a sample in every other step no step takes 400 instructions (`tests/pil.rs`
+//! counts them on the target).
 //!
-//! Not here: when to run. Without a probe there is nothing to read, and the ECU starts anew with the next.
+//! Not here: when the estimator runs. Without a probe there is no reading, and the ECU starts the estimator anew with
+//! the next probe.
 
 #![expect(
     clippy::as_conversions,
@@ -60,19 +64,19 @@ pub struct Estimator {
     pub(crate) muscle: f32,
 }
 
-/// What t_nms drivers' arms have, s: the deviation that is reported holds the error that any of them makes.
+/// The range of t_nms of drivers' arms, s. The reported deviation covers the error that any of them causes.
 pub const T_NMS_RANGE_S: [f64; 2] = [0.06, 0.15];
 
-/// T_d that stays within this band for half a block is of nobody's hands: 0.012 N.m, the sensor's last digit up and down,
-/// in units of 2^-24 N.m.
+/// If T_d stays within this band for half a block, nobody holds the wheel: 0.012 N.m, one digit of the sensor up and
+/// down, in units of 2^-24 N.m.
 const QUIET: i32 = 201_327;
 
 /// One sample of the column with the torque that was applied until then.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sample {
-    /// When.
+    /// When it was taken.
     pub at: Instant,
-    /// T_h, probe and all.
+    /// T_h with the probe.
     pub applied: Torque,
     /// T_d.
     pub driver_torque: Torque,
@@ -93,31 +97,31 @@ pub struct Reading {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatorState {
     last_phase: Option<u32>,
-    /// Place in the first block's window, in 2^-32 of its length; the second is half a window apart.
+    /// Position in the window of the first block, in 2^-32 of its length; the second block is half a window later.
     window: u32,
     blocks: [Block; 2],
     /// The last T_d.
     torque: i32,
     /// Lowest and highest T_d of this half of a block.
     band: [i32; 2],
-    /// Nobody's hands in the half before.
+    /// Whether nobody held the wheel in the half before.
     quiet: bool,
-    /// The block that ended and was not read yet.
+    /// A block that has ended and has no reading yet.
     ended: Option<Block>,
     work: Work,
-    /// The last step left the work alone.
+    /// Whether the last step did none of the remaining work.
     spared: bool,
     average: Average,
     reading: Option<Reading>,
 }
 
-/// Before the first sample.
+/// An empty band, before the first sample.
 const NO_BAND: [i32; 2] = [i32::MAX, i32::MIN];
 
-/// Sums of one block, with its window.
+/// Weighted sums over one block.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Block {
-    /// Whether it was there from the beginning of its window.
+    /// Whether it began with its window.
     whole: bool,
     weight: f32,
     driver: Complex,
@@ -140,11 +144,11 @@ impl Complex {
 
 /// A block lasts the whole number of periods that is nearest to this, s.
 pub(crate) const BLOCK_S: f64 = 2.0;
-/// A block in which limits left less than half of the probe says nothing.
+/// A block in which limits left less than this share of the probe gives no reading.
 const LEAST_SHARE: f32 = 0.5;
 
 impl Estimator {
-    /// Nothing seen yet.
+    /// The state before the first sample.
     #[must_use]
     pub fn start(&self) -> EstimatorState {
         EstimatorState {
@@ -170,7 +174,7 @@ impl Estimator {
 
     /// One step while there is a probe, with the column's sample if there is a new one.
     pub fn step(&self, state: &mut EstimatorState, sample: Option<&Sample>) {
-        // A sample is work enough for a step, but must not keep the rest waiting if there is one in every step.
+        // A step with a sample does none of the remaining work, unless every step has a sample.
         state.spared = sample.is_some() && !state.spared;
         if !state.spared {
             let [low, high] = state.band;
@@ -186,8 +190,8 @@ impl Estimator {
         let (quiet, before) = (high.saturating_sub(low) < QUIET, state.quiet);
         (state.band, state.quiet) = (NO_BAND, quiet);
         if quiet || before {
-            // A driver who relies on the guidance fully moves the wheel all the same; nobody's hands do not. What was
-            // read before is no evidence of who takes it next.
+            // Even a driver who relies fully on the guidance changes the torque a little; a free wheel does not.
+            // Earlier readings are no evidence of who takes the wheel next.
             state.average = Average::new(self.amplitude_nm);
             (state.reading, state.ended) = (None, None);
             state.work = Work::Nothing;
@@ -196,7 +200,8 @@ impl Estimator {
         }
     }
 
-    /// The next piece of what a block that has ended leaves to do. Apart, so that a step without any is short.
+    /// Does the next piece of the work that an ended block leaves. It is not inlined, so that steps without such work
+    /// stay short.
     #[inline(never)]
     fn go_on(&self, state: &mut EstimatorState) {
         state.work = match state.work {
@@ -221,10 +226,11 @@ impl Estimator {
         };
     }
 
-    /// Adds a sample to both blocks; returns the one that ended before it, whole or not. Apart, as [`Self::go_on`].
+    /// Adds a sample to both blocks, and returns the block that ended before it, if one did. It is not inlined, like
+    /// [`Self::go_on`].
     #[inline(never)]
     fn add(&self, state: &mut EstimatorState, sample: &Sample) -> Option<Block> {
-        // 2^32 us are a whole number of turns, so that the clock's wrap is none of the phase.
+        // 2^32 us are a whole number of turns, so the phase does not jump when the clock wraps.
         let phase = self.phase_per_us.wrapping_mul(sample.at.us());
         let advance = phase.wrapping_sub(state.last_phase.unwrap_or(phase));
         state.last_phase = Some(phase);
@@ -261,7 +267,7 @@ impl Estimator {
         ended
     }
 
-    /// What a whole block says, if there was enough of a probe in it.
+    /// The reading of a block, if enough of the probe was applied in it.
     fn reading(&self, block: &Block) -> Option<f32> {
         let Block {
             driver,
@@ -272,22 +278,23 @@ impl Estimator {
         let re = driver.re - self.lag * driver.im + self.k_nms * wheel.re;
         let im = driver.im + self.lag * driver.re + self.k_nms * wheel.im;
         let power = applied.re * applied.re + applied.im * applied.im;
-        // A sine's coefficient is half its amplitude times the sum of the window.
+        // The coefficient of a sine is half its amplitude times the sum of the window's weights.
         let least = LEAST_SHARE * 0.5 * self.amplitude_nm * block.weight;
         ((power > 0.0) & (power >= least * least)).then(|| -(re * applied.re + im * applied.im) / power)
     }
 }
 
 impl EstimatorState {
-    /// The estimate, once there is one.
+    /// The estimate, if there is one yet.
     #[must_use]
     pub fn reading(&self) -> Option<Reading> {
         self.reading
     }
 }
 
-/// The sine as a float: the probe's own, good to 7e-7 in 30 instructions. micromath's is good to 2e-3 in 33, and with it
-/// three drives of 267 in `core/tests/estimator.rs` are read with another change of K_hg than the rule has.
+/// The sine as a float, from the probe's own: its error is 7e-7, and it takes 30 instructions. micromath's has an
+/// error of 2e-3 and takes 33; with it three of 267 drives in `core/tests/estimator.rs` show another change of K_hg
+/// than the rule gives.
 fn unit(phase: u32) -> f32 {
     const SCALE: f32 = 1.0 / (1 << 30) as f32;
     sine(phase).to_bits() as f32 * SCALE

@@ -1,13 +1,14 @@
-//! The probe: a small known sine that is added to the guidance torque so that the driver's answer to a torque
-//! can be told from what the driver does anyway. From passive driving the reliance cannot be read.
+//! The probe is a small, known sine that is added to the guidance torque. The driver's answer to it can be told from
+//! what the driver does anyway, and shows how much the driver relies on the guidance (K_hg). Without a probe K_hg
+//! cannot be identified while driving.
 //!
 //! It starts and ends without a jump: its amplitude grows linearly from zero over the first period, and falls
-//! likewise over the period after its end. Its slope stays within `2*pi*frequency*amplitude`, and 1.3 % more
-//! while it ends, so that with 3.5 N.m/s at most ([`crate::controller::params`] checks it) it stays under the envelope's
-//! 4 N.m/s.
+//! likewise over the period after its end. Its slope is at most `2*pi*frequency*amplitude`, and 1.3 % more while it
+//! ends. The parameters allow 3.5 N.m/s ([`crate::controller::params`] checks it) so the slope stays below the
+//! envelope's limit of 4 N.m/s.
 //!
-//! Error: at most 0.3 uN.m from a float64 sine of the same phase. A late step advances the phase by 2 ms at
-//! most: the torque must not jump because time did.
+//! The error is at most 0.3 uN.m from a float64 sine of the same phase. A late step advances the phase by at most 2
+//! ms, so that the torque does not jump.
 //!
 //! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
 //! word on the sum), and what the answer tells ([`crate::estimator`]).
@@ -30,37 +31,38 @@ words! {
 }
 
 words! {
-    /// Phase and gain.
+    /// The phase of the sine and the share of its amplitude.
     pub struct ProbeState {
         phase: u32,
-        /// Share of the amplitude in use, in 2^-32 of it: as a phase, so that it grows over one period.
+        /// Share of the amplitude, in 2^-32. It advances as the phase does, so that it grows over one period.
         gain: u32,
     }
 }
 
 impl ProbeState {
-    /// Silent.
+    /// There is no probe.
     pub const SILENT: Self = Self { phase: 0, gain: 0 };
 
-    /// Whether it is silent, or a sixteenth of a turn about its way through zero. What a free wheel answers by its inertia is little
-    /// there; what a hand answers comes late, and so lies on one side where the probe rises and on the other where it falls.
+    /// Whether the probe is silent, or within a thirty-second of a turn of a zero crossing. There the inertia of a
+    /// free wheel answers with almost no torque. A hand answers late, so its torque has one sign where the probe
+    /// rises through zero and the other where it falls.
     #[must_use]
     pub(crate) const fn is_passing_zero(&self) -> bool {
         self.gain == 0 || (self.phase.wrapping_add(SIXTEENTH >> 1) & (HALF - 1)) < SIXTEENTH
     }
 }
 
-/// Of a turn: 25 ms at 2.5 Hz, so that the slowest sender of a driver torque has a message in it.
+/// A sixteenth of a turn: 25 ms at 2.5 Hz, in which the slowest sender of a driver torque sends at least once.
 pub const SIXTEENTH: u32 = 1 << 28;
 
-/// Of a turn.
+/// Half a turn.
 const HALF: u32 = 1 << 31;
 
-/// As the envelope's rate limits count it: two ticks.
+/// Longest time that one step counts: two ticks, as in the envelope's rate limits.
 const MAX_ELAPSED_US: u32 = 2_000;
 
 impl Probe {
-    /// The torque to add now; `None` once it is silent.
+    /// Advances by `elapsed` and returns the torque to add; `None` while the probe is silent.
     #[must_use]
     pub fn step(&self, state: &mut ProbeState, elapsed: Micros, wanted: bool) -> Option<Torque> {
         let advance = self.phase_per_us.wrapping_mul(elapsed.us().min(MAX_ELAPSED_US));
@@ -75,7 +77,7 @@ impl Probe {
         }
         state.phase = state.phase.wrapping_add(advance);
         let gain = I1F31::from_bits((state.gain >> 1).cast_signed());
-        // No more than one.
+        // The product is at most one.
         let share = saturate(rounded::<_, U30>(gain.wide_mul(sine(state.phase))));
         let torque = self.amplitude.fixed().wide_mul(share);
         Some(Torque::from_wide(rounded(torque)))
@@ -147,7 +149,7 @@ mod tests {
         let mut state = ProbeState::SILENT;
         assert!(state.is_passing_zero());
         run(&mut state, 400, true).for_each(drop);
-        // A rim that answers in phase moves the torque by as large a share: a 32nd of a turn before and behind zero, and no more.
+        // The window is a thirty-second of a turn on either side of a zero crossing: there the sine is below this.
         let most = 0.2 * (core::f64::consts::TAU / 32.0).sin();
         let mut seen = [0; 2];
         for _ in 0..4000 {

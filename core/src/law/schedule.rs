@@ -1,17 +1,17 @@
-//! How much of the law's torque acts at a speed.
+//! The share of the law's torque that acts at a speed.
 //!
-//! A vehicle answers the wheel more the faster it goes, and a driver's own delay lets the loop with a guidance of one
-//! gain swing at the ends of the speeds. So the law is right at 60 km/h, where the paper has it, and its share falls
-//! linearly to one parameter at 20 km/h and to another at 130 km/h. Both are at most 1: a schedule only takes away, so
-//! that every bound on the law holds for it too, the monitor's among them.
+//! The faster a vehicle drives, the more it reacts to the wheel; with one gain for all speeds, and the delay of the
+//! driver, the loop oscillates at very low and at high speeds. So the whole torque acts at 60 km/h, the speed of the
+//! paper. Its share falls linearly to one parameter at 20 km/h and to another at 130 km/h. Both are at most 1, so
+//! that every bound on the law's torque, the monitor's among them, also holds with a schedule.
 
 use crate::quantity::{Ratio, Speed, product};
 use crate::safety::redundant::words;
 
 words! {
-    /// Shares at the ends, as lines from the middle.
+    /// The shares as two straight lines from the middle speed.
     pub struct Schedule {
-        /// What a m/s below the middle takes away, and a m/s above it.
+        /// Decrease of the share for each m/s below the middle speed, and above it.
         per_slower: Ratio,
         per_faster: Ratio,
         /// Least shares.
@@ -20,15 +20,15 @@ words! {
     }
 }
 
-/// Where the low share is reached: 20 km/h.
+/// The speed at and below which the low share acts: 20 km/h.
 pub const SLOW_M_PER_S: f64 = 20.0 / 3.6;
-/// Where all of the torque is there: 60 km/h.
+/// The speed at which the whole torque acts: 60 km/h.
 pub const MIDDLE: Speed = Speed::from_m_per_s(60.0 / 3.6);
-/// Where the high share is reached: 130 km/h.
+/// The speed at and above which the high share acts: 130 km/h.
 pub const FAST_M_PER_S: f64 = 130.0 / 3.6;
 
 impl Schedule {
-    /// From the shares at the ends.
+    /// The schedule with these shares at its ends.
     #[expect(clippy::float_arithmetic, reason = "parameters are SI values in f64")]
     pub(crate) const fn new(slow: f64, fast: f64) -> Self {
         let middle = 60.0 / 3.6;

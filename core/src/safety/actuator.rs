@@ -1,18 +1,18 @@
-//! Whether the motor delivers what it is told.
+//! Checks whether the motor delivers the torque that was commanded.
 //!
-//! The delivered torque comes back with the column's sensors, a few milliseconds late, and a motor needs time of its
-//! own. So it is compared with a band: all that an honest motor may deliver of what was commanded, with a dead time of
-//! up to 8 ms, a first-order lag of up to 20 ms, and an error of 0.1 N.m and an eighth of the torque. The ends of the
-//! band go at once to where the command goes away from zero of the band, and follow it back with 21 ms: whatever a
-//! motor with a shorter lag does, it does within them.
+//! The measured torque comes with the column's sensors, a few milliseconds late, and the motor itself has a lag. So
+//! the measurement is compared with a band: all torques that a working motor may deliver for the last commands, with
+//! a dead time of up to 8 ms, a first-order lag of up to 20 ms, and an error of 0.1 N.m plus an eighth of the torque.
+//! An end of the band moves outward with the command at once, and back with a lag of 21 ms, so that the torque of a
+//! motor with a shorter lag stays inside.
 //!
-//! Two things can be wrong, and they are not alike. A torque that nobody asked for steers the vehicle: *astray*, and
-//! no torque any more. A torque that is missing leaves the driver with more to do, at once and for good if it were cut
-//! as well: *weak*, and what is left is handed over.
+//! Two faults are told apart. An *astray* motor delivers a torque that was not commanded, which steers the vehicle:
+//! the torque is switched off. A *weak* motor delivers too little. Switching it off would take the rest from the
+//! driver at once, so the ECU hands over what is left.
 //!
-//! A measurement speaks for 4 ms, two periods of the column: compared with later commands, an old one would turn a
-//! silent column into a faulty motor. Not kept twice: a flip here raises a fault or hides one until the next few
-//! samples; fixed arrays, so that it can do nothing else.
+//! A measurement is used for 4 ms, two periods of the column's sensors. An older one, compared with newer commands,
+//! would make a silent column look like a faulty motor. The state is not kept twice: a flipped bit raises or hides a
+//! fault until the next few samples, and can do nothing else, as all arrays are of fixed size.
 
 use fixed::types::{I0F32, I8F24};
 
@@ -20,40 +20,41 @@ use crate::quantity::Torque;
 
 /// Sensor error and ripple of a motor torque.
 const MARGIN: Torque = Torque::from_nm(0.1);
-/// The torque's own error, of which a magnet's temperature is most: 2^-3 of it.
+/// Relative error of the torque, 2^-3, mostly from the temperature of the motor's magnets.
 const ERROR_SHIFT: u32 = 3;
-/// So many steps of a torque that should not be there are tolerated.
+/// How many steps with a torque that was not commanded are tolerated.
 const ASTRAY_PATIENCE: u32 = 10;
-/// So many steps of a torque that is missing: longer than the lag of a motor that is not first order.
+/// How many steps with a missing torque are tolerated: longer than the lag of a motor of higher order.
 const WEAK_PATIENCE: u32 = 50;
-/// So many steps are judged by one measurement.
+/// How many steps use one measurement.
 const SPEAKS_FOR: u32 = 4;
-/// Commands that a measurement may be an echo of. A power of two, so that the place is a mask.
+/// How many earlier commands are remembered: a measurement may answer any of them. A power of two, so that the index
+/// is a mask.
 const COMMANDS: usize = 8;
 
-/// What the motor makes of its commands.
+/// How the motor follows its commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motor {
-    /// What an honest one would.
+    /// It delivers what a working motor may deliver.
     Obeys,
-    /// It has delivered less than it was told for more than 50 ms.
+    /// It has delivered less than commanded for more than 50 ms.
     Weak,
-    /// It has delivered a torque that it was not told for more than 10 ms.
+    /// It has delivered a torque that was not commanded for more than 10 ms.
     Astray,
 }
 
-/// The last commands, and what came of them; at first nothing commanded, nothing delivered.
+/// The last commands, the band and the last measurement; all zero at first.
 #[derive(Debug, Clone, Default)]
 pub struct Actuator {
-    /// A ring.
+    /// The last commands, in a ring.
     commanded: [Torque; COMMANDS],
-    /// Where the oldest is. Every number names a place, modulo the ring.
+    /// Index of the oldest command, modulo the length of the ring.
     oldest: usize,
-    /// Ends of what an honest motor may deliver now.
+    /// Ends of the band.
     low: Torque,
     high: Torque,
     delivered: Torque,
-    /// Steps that the measurement still speaks for.
+    /// For how many more steps the measurement is used.
     fresh: u32,
     astray: u32,
     weak: u32,
@@ -65,15 +66,15 @@ impl Actuator {
         (self.delivered, self.fresh) = (torque, SPEAKS_FOR);
     }
 
-    /// Takes the command of the last step. Without a measurement there is nothing to say: its silence is a fault of
-    /// the column.
+    /// Takes the command of the last step, and judges the motor. Without a fresh measurement the verdict stays as it
+    /// is: a missing measurement is a fault of the column.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn judge(&mut self, commanded: Torque) -> Motor {
         let place = &mut self.commanded[self.oldest % COMMANDS];
         let before = core::mem::replace(place, commanded);
         self.oldest = self.oldest.wrapping_add(1);
         let (low, high) = (commanded.min(before), commanded.max(before));
-        // An end moves out at once, and back with a lag.
+        // An end moves outward at once, and back with a lag.
         self.high = if self.high > high {
             lagging(self.high, high)
         } else {
@@ -86,7 +87,7 @@ impl Actuator {
         };
         if self.fresh > 0 {
             self.fresh = self.fresh.saturating_sub(1);
-            // The usual case first: within the band, whatever the errors may be.
+            // The usual case first: inside the band even without any error.
             if self.low <= self.delivered && self.delivered <= self.high {
                 (self.astray, self.weak) = (0, 0);
                 return Motor::Obeys;
@@ -111,8 +112,8 @@ impl Actuator {
     }
 }
 
-/// An end of the band, a step of 1 ms on its way back to the command: 3/64 of it, a lag of 21 ms. Rounded down, so that it
-/// never passes the command.
+/// Moves an end of the band back towards the command for one step of 1 ms, by 3/64 of the distance: a lag of 21 ms.
+/// The result is rounded so that it never passes the command.
 fn lagging(end: Torque, command: Torque) -> Torque {
     const SHARE: I0F32 = I0F32::from_bits(3 << (32 - 6));
     // Nothing wraps: a frame has room for commands of 5 N.m, and the ends lie between commands.

@@ -1,8 +1,9 @@
-//! How far the lane is trusted while its camera sees nothing, or another line.
+//! The trust in the lane while the camera sees nothing, or sees another line.
 //!
-//! In Active a lane that is silent, invalid or elsewhere does not end guidance at once. The lane seen last goes on along what
-//! was seen of the road ([`crate::safety::plausibility::Plausibility::extrapolated_lane`]), and the share of the law's torque that acts, the
-//! *trust*, falls:
+//! In Active a lane that is silent, invalid, or suddenly at another place does not end guidance at once. The last
+//! lane is extrapolated along the part of the road that was seen
+//! ([`crate::safety::plausibility::Plausibility::extrapolated_lane`]), and the *trust*, which is the share of the
+//! law's torque that acts, falls:
 //!
 //! | what comes | trust | for at most |
 //! |---|---|---|
@@ -10,33 +11,37 @@
 //! | pictures of a line elsewhere | falls by 2 a second | 4 s; the new line is taken when there is no trust left and it is near |
 //! | pictures that agree | rises by 1 a second | |
 //!
-//! What lasts longer is a loss, as outside Active. So a loss costs a second, in which the torque follows the road on the line
-//! of a handover (docs/decisions/012).
+//! If it lasts longer, the input is lost, as outside Active. So a loss is declared a second later than outside
+//! Active; meanwhile the torque follows the road and falls as fast as in a handover (docs/decisions/012).
 //!
-//! Not here: where the lane goes on to, and what a loss leads to ([`crate::controller`]).
+//! Not here: how the lane is extrapolated, and what a loss leads to ([`crate::controller`]).
 
 use crate::law::LaneSample;
 use crate::quantity::{Metres, Micros, Radians, Ratio, Torque, per_second};
 use crate::safety::redundant::words;
 
-/// A camera that sees nothing for longer is lost.
+/// After this time without a picture the lane is lost.
 pub const MOST_BLIND: Micros = Micros::from_ms(1000);
-/// A line that stays elsewhere for longer is no lane of this vehicle: a lane change by hand at 0.35 m/s comes near it sooner.
+/// After this time with pictures of a line elsewhere the lane is lost. A lane change by hand at 0.35 m/s comes near
+/// the new line sooner.
 const MOST_APART: Micros = Micros::from_ms(4000);
-/// Where a line is near enough to be taken: what a car of 1.9 m has beside it in a lane of 3.5 m.
+/// Lateral error below which a new line is adopted: the free space beside a car of 1.9 m in a lane of 3.5 m.
 const NEAR: Metres = Metres::from_m(0.8);
-/// Where it is a line along the road: 0.1 rad at the far point of a bend of 2.5 m/s2, and as much for the vehicle.
+/// Yaw error below which a new line is adopted: 0.1 rad at the far point of a bend of 2.5 m/s2, and as much for the
+/// vehicle's own direction.
 const ALONG: Radians = Radians::from_rad(0.2);
-/// Change of trust in a second without a picture: as a handover falls.
+/// Change of trust per second without a picture: as fast as in a handover.
 pub const BLIND_FALL: Ratio = Ratio::from_si(-0.5);
-/// With pictures of a line elsewhere it is as fast as a fade of 2 N.m; and with pictures that agree.
+/// Change of trust per second with pictures of a line elsewhere, as fast as a torque of 2 N.m fades; and with
+/// pictures that agree.
 const APART_FALL: Ratio = Ratio::from_si(-2.0);
 const RISE: Ratio = Ratio::ONE;
 
-/// What the lane that goes on asks for may move away from what the last picture asked for, in 2^-24 N.m per microsecond: not
-/// quite 1 N.m/s, by which the monitor's band grows. A vehicle that is thrown aside must not end in its veto.
+/// The torque for the extrapolated lane may depart from the torque for the last picture at this rate, in 2^-24 N.m
+/// per microsecond. It is slightly less than 1 N.m/s, the rate at which the monitor's band grows, so that the monitor
+/// does not refuse the torque where a gust moves the vehicle.
 pub const AWAY_PER_US: Torque = Torque::from_bits(16);
-/// The lane goes on by so much at a time.
+/// The lane is extrapolated once in this time.
 pub const EXTRAPOLATION_PERIOD: Micros = Micros::from_ms(10);
 
 /// Pictures come and agree.
@@ -47,12 +52,12 @@ const BLIND: u32 = 1;
 const APART: u32 = 2;
 
 words! {
-    /// What is remembered of the pictures that did not come.
+    /// What is remembered while pictures are missing.
     pub(crate) struct Coast {
         /// Share of the law's torque.
         pub(crate) trust: Ratio,
         blind: Micros,
-        /// Since the last picture that agreed, and what the law asked for then.
+        /// Time since the last picture that agreed, and the law's torque at that time.
         lost: Micros,
         demanded: Torque,
         sight: u32,
@@ -62,11 +67,11 @@ words! {
 /// What a new picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PictureVerdict {
-    /// The line, where it must be.
+    /// The line is where it was extrapolated to.
     Expected,
-    /// The same, in the first picture after some without it.
+    /// The line is where it was extrapolated to, in the first picture after some without it.
     Returned,
-    /// A line that is taken in its place.
+    /// Another line, which is adopted in its place.
     Adopted,
     /// A line elsewhere.
     Elsewhere,
@@ -82,13 +87,13 @@ impl Coast {
         sight: SEES,
     };
 
-    /// Whether there is nothing to make up for.
+    /// Whether pictures come and agree, trust is complete, and no earlier gap counts any more.
     #[inline(always)]
     pub(crate) fn is_idle(&self) -> bool {
         self.sight == SEES && self.trust == Ratio::ONE && self.blind.us() == 0
     }
 
-    /// Whether the lane seen last goes on in place of pictures.
+    /// Whether the extrapolated lane is used in place of pictures.
     pub(crate) const fn is_extrapolating(&self) -> bool {
         let is_short = self.lost.us() <= MOST_APART.us();
         is_short && (self.sees_other_line() || (self.sight == BLIND && self.blind.us() <= MOST_BLIND.us()))
@@ -99,7 +104,7 @@ impl Coast {
         self.sight == APART
     }
 
-    /// What may be asked for of what the lane that goes on asks for.
+    /// The law's torque for the extrapolated lane, limited by [`AWAY_PER_US`].
     pub(crate) fn limited(&self, demanded: Torque) -> Torque {
         if self.sight == SEES {
             return demanded;
@@ -111,7 +116,7 @@ impl Coast {
             .min(self.demanded.plus(away))
     }
 
-    /// No picture is in use; `asked` is what the law asks for now.
+    /// Notes that no picture is usable; `demanded` is the law's torque in this step.
     pub(crate) fn picture_missing(&mut self, demanded: Torque) {
         self.demanded = if self.sight == SEES {
             demanded
@@ -121,8 +126,8 @@ impl Coast {
         self.sight = BLIND;
     }
 
-    /// Takes a new picture, which agrees with the line as it went on or not. How that went on for longer than [`MOST_BLIND`] says
-    /// nothing: 3 mrad/s of yaw rate are half a metre within 3 s.
+    /// Takes a new picture; `agrees` says whether it fits the extrapolated lane. An extrapolation over more than
+    /// [`MOST_BLIND`] is no evidence: an error of 3 mrad/s in the yaw rate moves it by half a metre in 3 s.
     pub(crate) fn picture_arrived(
         &mut self,
         sample: &LaneSample,
@@ -151,7 +156,7 @@ impl Coast {
         PictureVerdict::Elsewhere
     }
 
-    /// Time passes.
+    /// Advances the times and the trust by `elapsed`.
     pub(crate) fn advance(&mut self, elapsed: Micros) {
         let (us, blind, lost) = (elapsed.us(), self.blind.us(), self.lost.us());
         let (per_s, blind, lost) = match self.sight {

@@ -1,8 +1,8 @@
-//! The torque envelope: the last word on every command. It knows nothing of the guidance law.
+//! The torque envelope limits every command last, whatever the guidance law demanded. It knows nothing of the law.
 //!
-//! All limits are judged on the torque that was really applied, which the caller hands in: the envelope
-//! keeps no history of its own that could drift from the truth. Every clamp returns its reason; the reason
-//! that won is the last one that acted.
+//! All limits start from the torque that was really applied, which the caller passes in: the envelope keeps no
+//! history of its own that could differ from it. Every limit that changes the command is reported; if several do, the
+//! last one is.
 //!
 //! | limit | bound |
 //! |---|---|
@@ -25,13 +25,13 @@ pub enum LimitReason {
     None = 0,
     /// The absolute limit L.
     Absolute = 1,
-    /// The growth within 250 ms.
+    /// The limit on the growth within 250 ms.
     Window = 2,
-    /// The rate of growth.
+    /// The limit on the rate of growth.
     WindUp = 3,
-    /// The rate of reduction.
+    /// The limit on the rate of reduction.
     Reduction = 4,
-    /// The driver opposes.
+    /// The driver opposes the torque.
     DriverOverride = 5,
     /// The mode allows no torque, or less than the law asks for.
     Mode = 6,
@@ -70,19 +70,19 @@ words! {
 }
 
 words! {
-    /// The anchor of the window; everything else is handed in.
+    /// The anchor of the window: the torque applied at its start, and when that was.
     pub struct EnvelopeState {
         anchor: Torque,
         anchor_at: Instant,
     }
 }
 
-/// What the envelope holds a wanted torque against.
+/// The circumstances that limit a wanted torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Situation {
     /// The torque really applied until now.
     pub applied: Torque,
-    /// Since when: the time that the rate limits may use.
+    /// Time since the last step, for the rate limits.
     pub elapsed: Micros,
     /// The driver's torque on the wheel.
     pub driver: Torque,
@@ -90,27 +90,28 @@ pub struct Situation {
 
 /// Growth per [`WINDOW`].
 pub const WINDOW_GROWTH: Torque = Torque::from_nm(1.2);
-/// How many times as fast a distrusted torque falls. At 8 N.m/s a lie of 5 N.m moves the vehicle by 0.25 m beyond where it
-/// goes without any torque, at 16 by 0.12 m, at 32 by 0.06 m (docs/decisions). At once it would be a blow.
+/// How many times as fast a torque falls that an implausible lane demanded. A wrong torque of 5 N.m that falls at 8
+/// N.m/s moves the vehicle by 0.25 m beyond where it goes without any torque, at 16 N.m/s by 0.12 m, at 32 N.m/s by
+/// 0.06 m (docs/decisions/003). A drop in one step would be felt as a blow.
 const DISTRUSTED: i32 = 4;
 /// Opposing driver torque at which the bound begins to shrink.
 pub const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);
-/// How fast it shrinks, N.m per N.m.
+/// How much the bound shrinks for each N.m of opposing torque beyond that, N.m per N.m.
 pub const OVERRIDE_SLOPE: Ratio = Ratio::from_si(3.0);
 
 /// Length of the window. Growth is counted from an anchor that moves up every 250 ms.
 pub const WINDOW: Micros = Micros::from_ms(250);
 
-/// A late step earns no more than this much of a rate limit: two ticks. A larger jump after a pause would
-/// be felt as one.
+/// Longest time for which one step uses the rate limits: two ticks. After a longer pause a larger change would be
+/// felt as a jump.
 const MAX_ELAPSED: Micros = Micros::from_ms(2);
 
-/// What rounding a command toward zero may take away after this file has judged it: an LSB of the guidance
-/// frame. Every other bound is an upper one, on which rounding toward zero is safe.
+/// Room for the rounding of a command toward zero in the guidance frame: one LSB. The bound on the reduction is the
+/// only lower one; on upper bounds rounding toward zero is safe.
 const ROUNDING: Torque = Torque::from_nm(1.0 / 4096.0);
 
 impl EnvelopeState {
-    /// No torque so far.
+    /// No torque has been applied.
     #[must_use]
     pub const fn new(now: Instant) -> Self {
         Self {
@@ -121,7 +122,7 @@ impl EnvelopeState {
 }
 
 impl Envelope {
-    /// The same for a torque that an implausible lane asked for: it falls faster.
+    /// The envelope for a torque that an implausible lane demanded: it falls faster.
     #[must_use]
     #[cold]
     pub fn distrusted(&self) -> Self {
@@ -160,20 +161,21 @@ impl Envelope {
             hold(&mut command, window.opposite(), window, LimitReason::Window);
         }
         self.hold_rates(&mut command, at);
-        // Last, and exempt from the reduction limit: whatever else holds, the driver's hand wins at once.
-        // Zero is always inside these bounds, so they can only make the torque smaller.
+        // The override comes last and is not held by the reduction limit: the driver's hand wins at once. Zero is
+        // always inside these bounds, so they can only make the torque smaller.
         let (low, high) = self.override_bounds(at.driver);
         hold(&mut command, low, high, LimitReason::DriverOverride);
         command
     }
 
-    /// Growth against lateral jerk, reduction against the hole that a sudden loss tears into the steering.
+    /// Applies the rate limits: growth is limited because of lateral jerk, reduction because a sudden loss of torque
+    /// disturbs the steering.
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
         let step = |rate: TorqueRate| Torque::from_fixed(per_second(rate.fixed(), elapsed));
         let growth = step(self.wind_up);
         let fall = step(self.reduction).minus(ROUNDING).max(Torque::ZERO);
-        // Judged in the frame where the applied torque is positive.
+        // Signs are mirrored so that the applied torque is positive.
         let mirror = at.applied < Torque::ZERO;
         let turn = |t: Torque| if mirror { t.opposite() } else { t };
         let applied = at.applied.abs();
@@ -191,7 +193,8 @@ impl Envelope {
         *command = (turn(turned.0), turned.1);
     }
 
-    /// `clamp(L + 3*(T_d + 0.8), 0, L)` above, `-clamp(L + 3*(0.8 - T_d), 0, L)` below (defaults).
+    /// The lowest and the highest torque that the driver's torque T_d allows: `-clamp(L + 3*(0.8 - T_d), 0, L)` and
+    /// `clamp(L + 3*(T_d + 0.8), 0, L)` with the default values.
     fn override_bounds(&self, driver: Torque) -> (Torque, Torque) {
         let bound = |toward: Torque| {
             let margin = toward.plus(OVERRIDE_FROM);
@@ -200,8 +203,8 @@ impl Envelope {
                 return self.absolute;
             }
             let shrunk = Torque::from_wide(product(OVERRIDE_SLOPE.fixed(), margin.fixed()));
-            // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway. Not
-            // `clamp`, which panics where its bounds are out of order.
+            // The bound lies between zero, which leaves the wheel to the driver, and L. This is not `clamp`, which
+            // panics where its bounds are out of order.
             self.absolute.plus(shrunk).min(self.absolute).max(Torque::ZERO)
         };
         (bound(driver.opposite()).opposite(), bound(driver))

@@ -6,7 +6,7 @@
 
 use crate::quantity::{Instant, Micros};
 
-/// What a fault leads to (`docs/explanation/behaviour.md`).
+/// The class of a fault, which decides the reaction (`docs/explanation/behaviour.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Class {
@@ -22,10 +22,10 @@ pub enum Class {
     L,
 }
 
-/// Declares the faults: `code Name: class, unseen;`. The code is the fault's bit in the fault word. *Unseen*, in ms, is for
-/// how long before its declaration the fault may have been there and spoilt the torque, beside the age of its input: no
-/// handover starts from an output of that time. 0 where the age says it all, or where the torque does not depend on it. What
-/// is longer than outputs are remembered trusts none: the handover starts from zero.
+/// Declares the faults: `code Name: class, unseen;`. The code is the fault's bit in the fault word. *Unseen*, in ms,
+/// is how long the fault may have spoilt the torque before it was declared, beside the age of its input. No handover
+/// starts from a torque of that time. It is 0 where the age of the input covers it, or where the torque does not
+/// depend on the input. Where it is longer than torques are remembered, the handover starts from zero.
 macro_rules! faults {
     ($($(#[$doc:meta])* $code:literal $name:ident: $class:ident, $unseen_ms:literal;)*) => {
         /// A fault, by its bit in the fault word. More will come.
@@ -43,7 +43,7 @@ macro_rules! faults {
             /// Every fault, in the order of the bits.
             pub const ALL: [Self; Self::COUNT] = [$(Self::$name),*];
 
-            /// What it leads to.
+            /// Its class.
             #[must_use]
             pub const fn class(self) -> Class {
                 match self {
@@ -51,7 +51,7 @@ macro_rules! faults {
                 }
             }
 
-            /// For how long it may have acted before it is declared, beside the age of its input.
+            /// How long it may have acted before it is declared, beside the age of its input.
             #[must_use]
             pub const fn unseen(self) -> Micros {
                 match self {
@@ -138,9 +138,9 @@ impl FaultSet {
     pub const INPUT: Self = Self::of_class(Class::B);
     /// Every fault of class C.
     pub const CRITICAL: Self = Self::of_class(Class::C);
-    /// What forbids to leave Boot.
+    /// Every fault that keeps the ECU in Boot (class Locked).
     pub const LOCKING: Self = Self::of_class(Class::Locked);
-    /// What ends guidance with a fade.
+    /// Every fault that ends guidance with a fade (class A).
     pub const FADING: Self = Self::of_class(Class::A);
     /// Every fault that has a name.
     const NAMED: u32 =
@@ -189,7 +189,7 @@ impl FaultSet {
         self.0 & other.0 != 0
     }
 
-    /// For how long any of them may have been there before it was declared, beside the ages of the inputs.
+    /// The longest time that any of them may have acted before it was declared, beside the ages of the inputs.
     #[must_use]
     pub fn unseen(self) -> Micros {
         let present = Fault::ALL.into_iter().filter(|fault| self.contains(*fault));
@@ -259,7 +259,8 @@ pub struct Record {
 
 /// How often each fault appeared since power-up, and when last.
 ///
-/// Not kept twice: it moves nothing. Fixed arrays, so that a flipped bit can only spoil a count or an age.
+/// It is not kept twice, as no torque depends on it. Its arrays are of fixed size, so that a flipped bit can only
+/// spoil a count or an age.
 #[derive(Debug, Clone)]
 pub struct FaultHistory {
     /// How often each fault appeared.
@@ -269,9 +270,9 @@ pub struct FaultHistory {
     present: FaultSet,
     /// Every fault that appeared since power-up.
     ever: FaultSet,
-    /// Whole seconds since power-up, saturating: no instant that could outlive a wrap of the clock.
+    /// Whole seconds since power-up, saturating. An instant would not do: the clock wraps.
     seconds: u32,
-    /// Start of the running one.
+    /// Start of the present second.
     second: Instant,
 }
 

@@ -1,28 +1,30 @@
-//! Whether the driver torque is alive.
+//! Checks whether the driver torque is alive, which means that it changes as a hand's torque does.
 //!
-//! A sensor that is stuck, or a task that sends its last value again, gives the same number whatever the hand does, and so
-//! takes the override away. No hand leaves a torque the same to the last bit while the wheel turns: that is asked for here.
-//! How far the wheel has to turn depends on what a false alarm costs. Before guidance begins it costs some
-//! more time in Standby; beside the probe, which moves the wheel to and fro, even a small turn has to be answered; and beside
-//! a guidance that acts it costs a handover, so that what a driver model without noise does in a bend has to stay below.
+//! A stuck sensor, or a task that sends its last value again, gives the same number whatever the hand does, so the
+//! driver could no longer override the guidance. With a hand on it, a torque never stays the same to the last bit
+//! while the wheel turns. So a torque that does not change while the wheel turns is a fault. How far the wheel has to
+//! turn for that depends on the cost of a false alarm. Before guidance begins the cost is some more time in Standby,
+//! and beside the probe, which turns the wheel to and fro, every hand answers: there a small turn is enough. During
+//! guidance the cost is a handover: there the limit is above the turn that driver models without noise make in a
+//! bend.
 //!
-//! Not here: a torque that is wrong and moves (the sum of torques in [`crate::safety::plausibility`]).
+//! Not here: a torque that changes and is wrong (the balance of torques in [`crate::safety::plausibility`]).
 
 use crate::quantity::{Micros, Radians, Torque};
 
-/// The torque has to be still for so long.
+/// How long the torque has to stay the same.
 pub const LASTS: Micros = Micros::from_ms(1000);
-/// A turn counts within this time: a slower one is what a driver does who hardly turns.
+/// The wheel has to turn within this time; a slower turn is ordinary driving on a nearly straight road.
 pub const WITHIN: Micros = Micros::from_ms(2000);
-/// So far the wheel turns meanwhile, beside a guidance that acts: 8 deg. Models of drivers without noise come to 6 deg.
+/// How far the wheel may turn meanwhile during guidance: 8 deg. Driver models without noise reach 6 deg.
 pub const MOST_TURN: Radians = Radians::from_rad(0.14);
-/// The same in Standby and beside the probe: 0.5 deg, five steps of an ordinary sensor.
+/// How far it may turn in Standby and beside the probe: 0.5 deg, five steps of an ordinary sensor.
 pub const MOST_TURN_WHEN_TESTED: Radians = Radians::from_rad(0.0087);
-/// Found, until the torque moves.
+/// Marks a torque that was found frozen, until it changes.
 const FOUND: Micros = Micros::from_us(u32::MAX);
 
-/// For how long the driver torque has been the same to the bit, and between which angles the wheel was meanwhile. Not kept twice: a
-/// flipped bit can end guidance by a handover, or delay what is found by two seconds.
+/// How long the driver torque has been the same to the bit, and between which angles the wheel was meanwhile. This
+/// state is not kept twice: a flipped bit can end guidance by a handover, or delay a finding by two seconds.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FrozenTorqueState {
     torque: Torque,
@@ -33,8 +35,8 @@ pub struct FrozenTorqueState {
 }
 
 impl FrozenTorqueState {
-    /// Takes a driver torque and a wheel angle that come so long after the last. Whether the torque is alive; while it is tested,
-    /// in Standby and beside the probe, it has to move for a small turn.
+    /// Takes a driver torque and a wheel angle that arrive `passed` after the last ones, and returns whether the
+    /// torque is alive. With `is_tested`, in Standby and beside the probe, the smaller turn counts.
     #[must_use]
     pub fn is_alive(&mut self, torque: Torque, wheel: Radians, passed: Micros, is_tested: bool) -> bool {
         if torque != self.torque {
@@ -45,7 +47,7 @@ impl FrozenTorqueState {
         if self.lasted == FOUND {
             return false;
         }
-        // What the wheel turned before the test does not count.
+        // A turn from before the test does not count.
         if self.lasted >= WITHIN || is_tested != self.is_tested {
             self.is_tested = is_tested;
             self.restart(wheel);
@@ -65,7 +67,7 @@ impl FrozenTorqueState {
         !is_found
     }
 
-    /// Counts from here on.
+    /// Starts to count from this angle.
     fn restart(&mut self, wheel: Radians) {
         (self.least, self.most, self.lasted) = (wheel, wheel, Micros::from_us(0));
     }

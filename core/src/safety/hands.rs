@@ -1,65 +1,66 @@
-//! Whether a hand is on the wheel, by what the column does.
+//! Decides from the driver torque whether a hand is on the wheel.
 //!
-//! A hand that holds a wheel which the guidance turns answers with torque. Where the guidance acts, the driver torque
-//! stays within 0.08 N.m of where it was, and it is no more than a sensor's offset, there is none: after 15 s of that the
-//! driver is warned, after 30 s the guidance ends with a fade (class A), as UN R79 has it for hands-off warnings. What
-//! counts is the torque's change, or a torque that no offset is; and only the time in which the guidance acts, so that
-//! a straight without a disturbance, where nobody has to do anything, is no proof. The probe is not counted: a hand that
-//! follows it fully answers with less than the sensor resolves.
+//! A hand on a wheel that the guidance turns answers with a torque. So there is no hand if the guidance acts and the
+//! driver torque stays within 0.08 N.m of a reference and is no larger than the offset of a sensor. After 15 s of
+//! that the driver is warned, and after 30 s the guidance ends with a fade (class A), as UN R79 asks for hands-off
+//! warnings. A hand is felt when the torque changes, or is larger than any offset. Only time in which the guidance
+//! acts is counted: on a straight without disturbance nobody has to do anything. The probe does not count as acting,
+//! as a hand that follows it fully answers with less than the sensor resolves.
 //!
 //! Not here: what the warning leads to ([`crate::controller`]).
 
 use crate::quantity::{Micros, Torque};
 use crate::safety::redundant::words;
 
-/// A change of the driver torque that only a hand makes: beyond the sensor's noise and the inertia of the wheel's rim.
+/// A larger change of the driver torque comes from a hand: it is above the sensor's noise and the inertia torque of
+/// the wheel's rim.
 pub const FELT: Torque = Torque::from_nm(0.08);
-/// A driver torque that only a hand makes, whatever it was before: above the largest offset of a sensor.
+/// A larger driver torque comes from a hand, whatever it was before: it is above the largest offset of a sensor.
 pub const HELD: Torque = Torque::from_nm(0.35);
-/// A guidance torque that a hand would answer.
+/// A guidance torque of at least this size counts as acting: a hand would answer it.
 pub const ACTS: Torque = Torque::from_nm(0.05);
-/// No hand for so long: the driver is warned.
+/// After this time without a hand the driver is warned.
 pub const WARN: Micros = Micros::from_ms(15_000);
-/// No hand for so long: the guidance ends.
+/// After this time without a hand the guidance ends.
 pub const END: Micros = Micros::from_ms(30_000);
 
 words! {
-    /// What was felt, and for how long no more.
+    /// The driver torque that was last felt, and the time since.
     pub struct HandsState {
-        /// The driver torque that a change is counted from.
+        /// The reference: the driver torque at the last change.
         reference: Torque,
-        /// Time in which the guidance acted since.
+        /// Time since then in which the guidance acted.
         time_hands_off: Micros,
     }
 }
 
 impl HandsState {
-    /// A hand on the wheel.
+    /// The state with a hand on the wheel.
     pub const NEW: Self = Self {
         reference: Torque::ZERO,
         time_hands_off: Micros::from_us(0),
     };
 
-    /// Takes a driver torque that came since the last step.
+    /// Takes a new driver torque, and resets the time if a hand is felt in it.
     pub fn update(&mut self, driver: Torque) {
         if driver.abs() > HELD || driver.plus(self.reference.opposite()).abs() > FELT {
             (self.reference, self.time_hands_off) = (driver, Micros::from_us(0));
         }
     }
 
-    /// Another `elapsed` in which the guidance applied a torque, the probe not counted.
+    /// Adds `elapsed` to the time if the applied torque without the probe is at least [`ACTS`].
     pub fn add_guided_time(&mut self, guidance: Torque, elapsed: Micros) {
         if guidance.abs() >= ACTS {
             self.time_hands_off = Micros::from_us(self.time_hands_off.us().saturating_add(elapsed.us()));
         }
     }
 
-    /// Guidance begins: whoever asked for it is there.
+    /// Resets the time at the start of guidance: whoever requested it is there.
     pub fn reset(&mut self) {
         self.time_hands_off = Micros::from_us(0);
     }
 
-    /// For how long no hand was felt.
+    /// The guided time since a hand was last felt.
     #[must_use]
     pub const fn time_hands_off(&self) -> Micros {
         self.time_hands_off

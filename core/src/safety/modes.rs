@@ -10,11 +10,11 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Mode {
-    /// Checking itself and its parameters.
+    /// The ECU checks itself and its parameters.
     Boot = 0,
-    /// Ready or waiting for valid inputs; no torque.
+    /// The ECU is ready, or waits for valid inputs; no torque.
     Standby = 1,
-    /// Guiding.
+    /// The ECU guides.
     Active = 2,
     /// Planned end of guidance: the torque falls to zero at 4 N.m/s.
     Fade = 3,
@@ -22,7 +22,7 @@ pub enum Mode {
     Handover = 4,
     /// The computation, memory, timing or output failed: no torque until the next power-up.
     Fault = 5,
-    /// No good parameters, or resets in a row: no torque until the next power-up.
+    /// There are no valid parameters, or there were several resets in a row: no torque until the next power-up.
     Locked = 6,
 }
 
@@ -32,7 +32,7 @@ pub enum Mode {
 pub enum Event {
     /// The self-test passed.
     BootPassed = 0,
-    /// An explicit request, with the inputs ready for it.
+    /// The host requested guidance, and the inputs are ready for it.
     Engage = 1,
     /// The torque of a fade or a handover has reached zero.
     Faded = 2,
@@ -42,7 +42,7 @@ pub enum Event {
     InputLost = 4,
     /// The self-test found no usable parameters, or too many resets.
     BootRejected = 5,
-    /// Computation, memory, deadline or output fault (class C).
+    /// The computation, the memory, the deadline or the output failed (class C).
     Critical = 6,
 }
 
@@ -71,7 +71,8 @@ impl Mode {
     #[must_use]
     pub const fn after(self, event: Event) -> Self {
         match (self, event) {
-            // A fault or a lock ends with the next power-up, and a fault is the last word on any other mode.
+            // A fault or a lock ends only with the next power-up, and a critical fault leads there from any other
+            // mode.
             (Fault | Locked, _) => self,
             (_, Event::Critical) => Fault,
             (Boot, Event::BootPassed) => Standby,
@@ -87,7 +88,7 @@ impl Mode {
         }
     }
 
-    /// The mode after all that was raised in one step: the most urgent event that changes the mode decides.
+    /// The mode after the events of one step: the most urgent one that changes the mode decides.
     #[must_use]
     pub fn after_all(self, raised: Events) -> Self {
         let changing = raised.0 & self.changing().0;

@@ -1,9 +1,9 @@
-//! The independent monitor: alone holds the permission to drive, renews it every millisecond and withdraws
-//! it for good on disagreement.
+//! The independent monitor. It alone gives the permission to apply the torque, renews it every millisecond, and
+//! withdraws it for good when a command breaks one of its rules.
 //!
-//! A second, simpler computation in plain `i32` milli-newton-metres. It decodes the frames itself, from the
-//! bytes that leave and arrive, with its own limits, and uses nothing of the law, the envelope or the bus
-//! module: a mistake there must not repeat itself here. It shares how memory is guarded, and nothing else.
+//! It is a second, simpler computation in plain `i32` milli-newton-metres. It decodes the bytes of the frames that
+//! arrive and leave by itself, has its own limits, and uses nothing of the law, the envelope or the bus module, so
+//! that a mistake there is not repeated here. It shares only the way in which memory is kept twice.
 //!
 //! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (in Handover
 //! four times as fast as elsewhere; unless the mode says that it ends at once, or the driver overrides), in a mode without
@@ -36,7 +36,7 @@ words! {
 }
 
 words! {
-    /// What the monitor remembers: what changes in most steps, and what a picture changes.
+    /// What the monitor remembers: the part that most steps change, and the part that a picture changes.
     pub struct MonitorState {
         pub(crate) step: StepState,
         pub(crate) lane_state: LaneState,
@@ -44,15 +44,15 @@ words! {
 }
 
 words! {
-    /// What most steps change.
+    /// The part that most steps change.
     pub(crate) struct StepState {
         torque_mnm: i32,
         driver_mnm: i32,
-        /// Since the lane sample was true.
+        /// Time since the lane sample was taken.
         age_us: i32,
-        /// For how long there may still be a probe.
+        /// How long the torque may still contain the probe.
         probe_left_us: i32,
-        /// How many steps the torque was outside its band and not falling, since it was inside.
+        /// Number of steps in which the torque was outside its band and not falling, since it was last inside.
         astray_ms: i32,
         /// 1 after the first disagreement.
         withdrawn: i32,
@@ -60,12 +60,12 @@ words! {
 }
 
 words! {
-    /// What a new lane sample changes.
+    /// The part that a new lane sample changes.
     pub(crate) struct LaneState {
         lane: Lane,
-        /// How old it was when it came.
+        /// Its age when it arrived.
         came_us: i32,
-        /// An older lane sample, for rates, and how much older it is.
+        /// An older lane sample, from which the rates are computed, and how much older it is.
         before: Lane,
         older_us: i32,
         /// What its position asks for, and what its rates ask for beside.
@@ -82,14 +82,14 @@ words! {
     }
 }
 
-/// A frame with the time since the last step in mind: what the monitor is shown every millisecond.
+/// What the monitor is shown every millisecond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Evidence<'a> {
     /// Bytes of the latest lane preview frame in use, if a new one arrived.
     pub lane: Option<&'a [u8; 8]>,
     /// Bytes of the latest column frame in use, if a new one arrived.
     pub column: Option<&'a [u8; 8]>,
-    /// Bytes of the latest command frame in use, if a new one arrived.
+    /// Bytes of the latest request frame in use, if a new one arrived.
     pub request: Option<&'a [u8; 8]>,
     /// Bytes of the guidance frame about to leave.
     pub guidance: &'a [u8; 8],
@@ -105,28 +105,32 @@ const HANDOVER: i32 = 4;
 const LAST_WITH_TORQUE: i32 = HANDOVER;
 /// Half an LSB on each side, and the roundings of this file.
 const TOLERANCE_MNM: i32 = 3;
-/// In a handover a torque may fall so many times as fast: its lane may be a lie, of which the monitor knows nothing.
+/// How many times as fast a torque may fall in a handover. The lane may be implausible then, which the monitor does
+/// not know.
 const DISTRUSTED: i32 = 4;
-/// The probe ends within a period, and none is slower than 1 Hz; a command is stale after 30 ms.
+/// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 30 ms.
 const PROBE_END_US: i32 = 1_030_000;
-/// For how long the torque may be outside that band.
+/// How many steps the torque may be outside its band.
 pub const ASTRAY_MS: i32 = 20;
-/// Lane data older than this must not move the wheel in Active: a sample's age, and three periods of the slowest camera.
+/// In Active no torque may follow from lane data older than this: the age of a sample on arrival, and three periods
+/// of the slowest camera.
 const OLDEST_LANE_US: i32 = 360_000;
-/// For so long more the lane may go on: a second without a picture, and 0.3 s to let go of it where pictures then show another
-/// line. The band is wider by 1 mN.m for each millisecond since the last.
+/// How much longer the lane may be extrapolated: a second without a picture, and 0.3 s in which the torque falls
+/// where pictures then show another line. The band is wider by 1 mN.m for each millisecond since the last picture.
 const COAST_US: i32 = 1_400_000;
-/// A picture is left aside, as of another line, only after so long without one: less than any time-out. Whoever calls the pictures
-/// of a camera of 40 Hz and more another line's is not believed.
+/// A picture may be ignored, as one of another line, only after this time without a picture, which is shorter than
+/// any time-out. So a guidance frame that claims another line is not trusted while a camera of 40 Hz or more sends
+/// pictures.
 const UNSEEN_US: i32 = 25_000;
-/// A sample older than this is continued at its rates, for so long at most.
+/// A sample older than this is continued with its rates, for at most the second time.
 const PROMPT_LANE_US: i32 = 40_000;
 const LONGEST_LATE_US: i32 = OLDEST_LANE_US - PROMPT_LANE_US;
-/// Override bound: from 0.8 N.m of opposing torque, 3 N.m per N.m, and what two frames' time can change.
+/// The override bound: it begins at 0.8 N.m of opposing torque and falls by 3 N.m per N.m. The slack covers what can
+/// change in the time of two frames.
 const OVERRIDE_FROM_MNM: i32 = 800;
 const OVERRIDE_SLOPE: i32 = 3;
 const OVERRIDE_SLACK_MNM: i32 = 50;
-/// How many rules there are to try.
+/// The number of rules, each of which has a self-test.
 pub const RULES: u32 = 7;
 /// Rates are taken over at least this.
 pub const RATE_SPAN_US: i32 = 50_000;
@@ -223,7 +227,7 @@ impl Monitor {
         torque.saturating_abs() <= bound.saturating_add(OVERRIDE_SLACK_MNM)
     }
 
-    /// What the driver leaves of a torque to its side.
+    /// The largest torque that the driver's torque allows on the side of `torque`.
     fn bound(&self, torque: i32, driver: i32) -> i32 {
         let opposing = if torque.is_negative() {
             driver
@@ -263,7 +267,8 @@ impl Monitor {
         if state.step.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
         }
-        // What an old sample has become since: the same, or the errors went on at their rates for as long as a slow camera waits.
+        // An old sample may still be right, or its errors may have continued with their rates for as long as a slow
+        // camera waits.
         let late_us = state.step.age_us.saturating_sub(PROMPT_LANE_US);
         let (position, rate) = (state.lane_state.position_mnm, state.lane_state.rate_mnm);
         let both = position.saturating_add(rate);
@@ -302,12 +307,12 @@ impl Monitor {
         state.step.astray_ms <= ASTRAY_MS
     }
 
-    /// What the monitor is tried with: a state and a guidance frame, 1 ms later and without other frames, that
-    /// exactly one rule refuses. Each of [`RULES`] turns tries another one. (Below a limit of 0.1 N.m above the band
-    /// nothing can be astray, and the limit refuses that turn.)
+    /// A self-test: a state and a guidance frame 1 ms later, without other frames, that exactly one rule refuses.
+    /// Each of [`RULES`] turns tests another rule. (If the limit is less than 0.1 N.m above the band, no torque can
+    /// be outside the band only, and the limit refuses that turn.)
     #[must_use]
     pub fn self_test_vector(&self, turn: u32) -> (MonitorState, [u8; 8]) {
-        // As long as nothing else is said: a held torque that each rule allows.
+        // Unless a turn changes it: a constant torque that every rule allows.
         let (mut torque, mut grown, mut mode, mut state) = (100, 0, ACTIVE, MonitorState::NEW);
         match turn % RULES {
             0 => (torque, mode) = (self.limit_mnm.saturating_add(20), FADE),
@@ -331,7 +336,7 @@ impl Monitor {
 }
 
 impl MonitorState {
-    /// Takes what came; `true` for a new lane sample.
+    /// Takes the frames that arrived; `true` for a new lane sample.
     #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);

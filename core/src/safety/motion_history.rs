@@ -1,36 +1,37 @@
-//! How the vehicle turned, and where its line went, in the last half second.
+//! The heading of the vehicle and the direction of the line in the last half second.
 //!
-//! A camera's sample is 0 to 150 ms old when it arrives, and the near point of a preview comes to where its far point
-//! was some time before. Both need the vehicle's heading at an earlier instant, which is the sum of its rate of turn.
+//! A camera's sample is 0 to 150 ms old when it arrives, and the near point of a preview reaches a place some time
+//! after the far point was there. Both need the vehicle's heading at an earlier instant, which is the integral of its
+//! yaw rate.
 //!
-//! Not kept twice: rings of 32 places, of which a flip spoils one. What the law takes from here is bounded in
-//! [`crate::law`], so that a flip moves the torque by less than the monitor's band; what the checks take can declare
-//! or hide a fault for one second.
+//! The state is not kept twice: it is made of rings of 32 entries, of which a flipped bit spoils one. What the law
+//! uses of it is bounded in [`crate::law`], so that a flip changes the torque by less than the monitor's band; in the
+//! checks a flip can raise or hide a fault for one second.
 
 use fixed::types::{I8F24, I22F10, I40F24};
 
 use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second, saturate, signed_quotient};
 
-/// A power of two, so that the place is a mask.
+/// Entries of a ring. A power of two, so that the index is a mask.
 const RING: usize = 32;
-/// Two directions of the line are kept so far apart, so that the ring holds the time between near and far point.
+/// Least time between two stored directions of the line. With it the ring covers the time between near and far point.
 const APART: Micros = Micros::from_ms(20);
 
-/// The line's bend is that between its last direction and one so many before: 0.3 s at least, over which 2 mrad of noise
-/// make 0.01 rad/s.
+/// How many entries back the direction lies with which the last one is compared for the rate of the bend. That is at
+/// least 0.3 s, over which 2 mrad of noise make 0.01 rad/s.
 const BEND: usize = 15;
 
-/// The time over which the rate before a sample is taken, and how often it is in a second.
+/// The time over which the yaw rate before a sample is averaged, and how many such times a second has.
 const BEFORE: Micros = Micros::from_ms(50);
 const BEFORE_PER_S: i32 = 20;
 
-/// The vehicle's heading at an instant, and the rate at which it turned from there.
+/// The vehicle's heading at an instant, and its yaw rate from then on.
 #[derive(Debug, Clone, Copy)]
 pub struct Heading {
     at: Instant,
-    /// Against where it was when the ECU started, modulo 256 rad.
+    /// Heading relative to that at the start of the ECU, modulo 256 rad.
     psi: I8F24,
-    /// The rate of turn.
+    /// The yaw rate.
     pub rate: TurningRate,
 }
 
@@ -41,7 +42,7 @@ impl Heading {
         rate: TurningRate::ZERO,
     };
 
-    /// The same at an instant before it, if it turned as fast before: for half a second at most.
+    /// The heading at an earlier instant, if the yaw rate was the same before; for half a second at most.
     #[cold]
     fn earlier(&self, at: Instant) -> Self {
         let turned = per_second(self.rate.fixed(), self.at.since(at));
@@ -52,27 +53,27 @@ impl Heading {
         }
     }
 
-    /// The heading at an instant not before this one.
+    /// The heading at this instant or a later one.
     fn psi_at(&self, at: Instant) -> I8F24 {
         self.psi
             .wrapping_add(per_second(self.rate.fixed(), at.since(self.at)))
     }
 }
 
-/// The rings.
+/// The rings of headings and of directions of the line.
 #[derive(Debug, Clone)]
 pub struct MotionHistory {
     headings: [Heading; RING],
     newest: usize,
-    /// Directions of the line at the far point, in the frame of the headings.
+    /// Directions of the line at the far point, relative to the same direction as the headings.
     lines: [(Instant, I8F24); RING],
     last_line: usize,
-    /// How many of them count.
+    /// How many entries of `lines` are valid.
     known_lines: usize,
 }
 
 impl MotionHistory {
-    /// Nothing known.
+    /// Nothing is known yet.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -84,7 +85,7 @@ impl MotionHistory {
         }
     }
 
-    /// The rate of turn from now on.
+    /// Stores the yaw rate from now on.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn record_turning_rate(&mut self, now: Instant, rate: TurningRate) {
         let psi = self.headings[self.newest % RING].psi_at(now);
@@ -92,7 +93,8 @@ impl MotionHistory {
         self.headings[self.newest % RING] = Heading { at: now, psi, rate };
     }
 
-    /// The heading known last before an instant, or that of then if the vehicle turned as it did at the oldest.
+    /// The last heading stored before an instant. For an instant before the oldest entry, the heading that follows if
+    /// the yaw rate was the same before.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
     pub fn heading(&self, now: Instant, at: Instant) -> Heading {
@@ -102,8 +104,8 @@ impl MotionHistory {
         found.map_or_else(|| place(RING.wrapping_sub(1)).earlier(at), |heading| *heading)
     }
 
-    /// How far the vehicle turned from an instant until now, and the rate at which it turned before then: over 50 ms, the
-    /// middle of which is as old as the law's filtered rates are.
+    /// The angle that the vehicle turned from an instant until now, and its yaw rate before that instant. The rate is
+    /// averaged over 50 ms, whose middle is as old as the law's filtered rates.
     #[must_use]
     pub fn turned(&self, now: Instant, from: Instant) -> (Radians, TurningRate) {
         let then = self.heading(now, from);
@@ -114,7 +116,8 @@ impl MotionHistory {
         (Radians::from_fixed(turned), rate)
     }
 
-    /// The direction of the line at the far point, `e_theta` from the vehicle's heading at `at`.
+    /// Stores the direction of the line at the far point, which is `e_theta` relative to the vehicle's heading at
+    /// `at`.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn record_line(&mut self, now: Instant, at: Instant, e_theta: Radians) {
         let direction = self.heading(now, at).psi_at(at).wrapping_add(e_theta.fixed());
@@ -125,15 +128,15 @@ impl MotionHistory {
         }
     }
 
-    /// The direction of the line `before` an instant, against the vehicle's heading at that instant: where the far point
-    /// was then. `None` where that is longer ago than the line is known.
+    /// The direction that the line had at the far point at the time `before` an instant, relative to the vehicle's
+    /// heading at that instant. `None` where the line was not yet known.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
     pub fn line_direction(&self, now: Instant, at: Instant, before: Micros) -> Option<Radians> {
         let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
         let wanted = at.before(before);
         let age = now.since(wanted);
-        // The first that is as old, by halving: the further back, the older.
+        // Bisection for the newest entry that is at least as old; entries further back are older.
         let (mut back, mut end) = (0, self.known_lines);
         while back < end {
             let middle = back.wrapping_add(end) / 2;
@@ -147,7 +150,7 @@ impl MotionHistory {
             return None;
         }
         let (from, direction) = place(back);
-        // Straight from there to the one after.
+        // Linear interpolation to the next entry.
         let (to, next) = place(back.saturating_sub(1));
         let (span, done) = (to.since(from).us(), wanted.since(from).us());
         let share = done
@@ -163,8 +166,8 @@ impl MotionHistory {
         Some(Radians::from_fixed(direction.wrapping_sub(psi)))
     }
 
-    /// By how much the direction of the line at the far point changes, against the vehicle's heading, from one instant to a
-    /// later one if the line goes on to bend as it did.
+    /// The change of the line's direction at the far point relative to the vehicle's heading, from one instant to a
+    /// later one, if the line keeps its present bend.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
     pub fn direction_change(&self, now: Instant, from: Instant, to: Instant) -> Radians {
@@ -178,7 +181,7 @@ impl MotionHistory {
         Radians::from_fixed(per_second(rate, to.since(from)).saturating_sub(turned))
     }
 
-    /// The line was lost.
+    /// Forgets the line, which was lost.
     pub fn forget_line(&mut self) {
         self.known_lines = 0;
     }

@@ -1,33 +1,38 @@
-//! Whether the inputs can be true together: what a CRC cannot see.
+//! Checks whether the inputs can be true together. A CRC cannot see that: a frame may be intact and its values wrong.
 //!
 //! **Lane.** Between two samples the near-point error must move as the vehicle does:
-//! `de_y'/dt = v*theta_n - L_n*psi_dot`, with the line's direction at the near point against the vehicle's, `theta_n`, and
-//! the rate of turn, `psi_dot`. With a measured yaw rate both are known: the near point is now where the far point was
-//! `t'_f - t'_n` ago, so that `theta_n` is the far point's direction of then, less what the vehicle has turned since
-//! ([`crate::safety::motion_history`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
-//! yaw rate's zero; a slow estimate takes them away, bounded so that a lie cannot hide in it. Without a yaw rate that is
-//! believed ([`crate::safety::yaw`]) the rate of turn comes from wheel angle and speed by the steady-state bicycle model, and from what
-//! the yaw rate was more in the long run. A gust, a bank or a tyre spoils it, so the margins are 2.5 times as wide.
+//! `de_y'/dt = v*theta_n - L_n*psi_dot`. Here `theta_n` is the direction of the line at the near point relative to
+//! the vehicle, `L_n` the distance to that point, and `psi_dot` the yaw rate. With a measured yaw rate both are
+//! known: the near point is where the far point was `t'_f - t'_n` earlier, so `theta_n` is the direction that the far
+//! point had at that time, minus the angle that the vehicle has turned since ([`crate::safety::motion_history`]).
+//! What then remains of a correct preview are constant errors: the mounting angle of the camera and the offset of the
+//! yaw rate. A slow estimate, the *bias*, removes them. It is bounded so that it cannot absorb a false lane. Where no
+//! trusted yaw rate exists ([`crate::safety::yaw`]), it is computed from wheel angle and speed by the steady-state
+//! bicycle model, plus the long-run difference between measurement and model. Gusts, banked roads and worn tyres make
+//! this value less accurate, so the margins are then 2.5 times as wide.
 //!
-//! The change predicted and the change seen are both summed with a memory of 1 s; the preview is declared implausible
-//! when the prediction exceeds what was seen, in the prediction's direction, by the margin. So a frozen, flipped or too
-//! small error is found when it must have moved; an error that moves *more* than predicted (gust, noise, a camera's
-//! scale) is a valid extreme and meets the envelope only, up to `UNREAL`: with a measured yaw rate, what goes further than
-//! that beyond the prediction is a line that slides away. A yaw error that is frozen or flipped predicts a movement that
-//! does not come, and is found the same way.
+//! The predicted change and the observed change are each summed with a time constant of 1 s. The preview is
+//! implausible when the predicted sum exceeds the observed one, in the direction of the prediction, by more than the
+//! margin. So an error that is frozen, has the wrong sign or is too small is found as soon as it should have moved.
+//! An error that moves *more* than predicted (by a gust, by noise, by the camera's scale) may be real and is limited
+//! by the envelope alone, but only up to `UNREAL`: with a measured yaw rate, an error that moves further than that
+//! beyond the prediction belongs to a line that slides away. A yaw error that is frozen or has the wrong sign
+//! predicts a movement that does not happen, and is found in the same way.
 //!
-//! **Column.** Torque in equals torque out: `T_d + T_a + T_h = c_a*v*psi_dot + B_s*dphi/dt`. Of the power assist `T_a` only
-//! its direction is known, and that it is at most [`ASSIST`] times `T_d`; of the aligning torque, that it is right by 30 %
-//! (trail, tyres, load); and there is friction. All this is summed with a memory of 1 s, and the sum is what of it lies
-//! nearest to zero: the least momentum that the column must lack whatever friction and aligning torque were. So what a hand
-//! pushes for a moment and the column answers later comes to nothing. The inertia (0.11 kg.m2 at hand speeds: 0.02 N.m.s) is
-//! far inside the margin. A constant torque (a bank, a pull, the sensor's zero) is estimated slowly, and bounded.
+//! **Column.** The torques on the steering column balance: `T_d + T_a + T_h = c_a*v*psi_dot + B_s*dphi/dt`. Not all
+//! of them are known exactly. The power assist `T_a` acts in the direction of `T_d` and is at most [`ASSIST`] times
+//! as large; the aligning torque `c_a*v*psi_dot` may be wrong by 30 % (trail, tyres, load); and there is friction. So
+//! the imbalance is an interval. Its value nearest to zero is summed with a time constant of 1 s: the sum is the
+//! least momentum that is unaccounted for, whatever assist, friction and aligning torque were. A short push by the
+//! hand that the column answers later cancels in this sum. The inertia (0.11 kg.m2, 0.02 N.m.s at the speeds of a
+//! hand) is far below the margin. A constant torque (a banked road, a pull to one side, the offset of the sensor) is
+//! estimated slowly, within bounds.
 //!
-//! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump persists, the input goes
-//! stale, and in Active the lane seen last goes on ([`crate::safety::coast`]).
+//! **Steps.** A sample that jumps further than a vehicle can move is rejected like a damaged frame. If the jump
+//! persists, the input times out; in Active the last lane is then extrapolated ([`crate::safety::coast`]).
 //!
-//! Honest driving, the participants of the paper's tables 5 and 6 and lane changes of 1 m/s at 40 to
-//! 120 km/h stay below the margins (`tests/plausibility.rs` prints by how much).
+//! Fault-free driving stays below the margins: the participants of the paper's tables 5 and 6, and lane changes of 1
+//! m/s at 40 to 120 km/h (`tests/plausibility.rs` prints by how much).
 
 use fixed::types::{I0F32, I8F24, I40F24};
 
@@ -43,7 +48,7 @@ use crate::safety::redundant::words;
 use crate::safety::yaw::{BIAS_SHIFT, YawState};
 
 words! {
-    /// The vehicle as the checks know it; immutable once validated by [`crate::controller::params`].
+    /// The parameters of the vehicle that the checks use; immutable once validated by [`crate::controller::params`].
     pub struct Plausibility {
         /// K_t/l: front wheel angle per wheel angle, over the wheelbase.
         pub(crate) curvature_gain: CurvaturePerAngle,
@@ -55,14 +60,14 @@ words! {
         pub(crate) column_damping: TorquePerTurningRate,
         /// t'_f, s.
         pub(crate) far_time: Seconds,
-        /// t'_n, s, and how long before the far point is where the near point is now.
+        /// t'_n, s; and the time that the vehicle needs from the near point to the far point, at least 0.
         pub(crate) near_time: Seconds,
         pub(crate) between: TimeAndShare,
     }
 }
 
 words! {
-    /// Sums and last samples. What changes with one message is a part, so that no other is copied with it.
+    /// Sums and last samples. What one message changes is a struct of its own, so that only that struct is copied.
     pub struct PlausibilityState {
         pub(crate) motion: MotionState,
         pub(crate) lane: LaneState,
@@ -71,36 +76,37 @@ words! {
 }
 
 words! {
-    /// What a message of the vehicle changes.
+    /// The part that a Vehicle message changes.
     pub(crate) struct MotionState {
         speed: Speed,
-        /// Rate of the direction of movement per wheel angle at this speed, 1/s.
+        /// Yaw rate per wheel angle at this speed by the bicycle model, 1/s.
         turning_gain: TurningRatePerAngle,
         /// The measured yaw rate, if there is one.
         yaw_rate: TurningRate,
         has_yaw_rate: u32,
         pub(crate) yaw: YawState,
-        /// For how long the speeds have been apart.
+        /// For how long the two speeds have disagreed.
         apart: Micros,
     }
 }
 
 words! {
-    /// What a check of the lane changes.
+    /// The part that a check of the lane changes.
     pub(crate) struct LaneState {
         is_known: u32,
-        /// Whether the last picture differed from the one before: one that comes again is no witness.
+        /// 1 if the last picture differed from the one before. A picture that repeats itself is no evidence against
+        /// another sensor.
         is_alive: u32,
         last: LaneSample,
         predicted: Metres,
         seen: Metres,
-        /// What the prediction is wrong by in the long run.
+        /// The long-run error of the prediction, which corrects it.
         bias: Speed,
     }
 }
 
 words! {
-    /// What a message of the column changes.
+    /// The part that a Column message changes.
     pub(crate) struct ColumnState {
         is_known: u32,
         at: Instant,
@@ -108,7 +114,7 @@ words! {
         /// The wheel's angle at the last check.
         checked: Radians,
         sum: AngularImpulse,
-        /// The torque that the column lacks in the long run.
+        /// The long-run imbalance of the torques, which is subtracted.
         bias: Torque,
     }
 }
@@ -146,8 +152,8 @@ impl PlausibilityState {
         },
     };
 
-    /// The rate of turn: measured, or else that of the direction of movement by wheel angle and speed, and what the yaw rate was
-    /// more.
+    /// The yaw rate: the measured one, or else that of the bicycle model plus the long-run difference between the
+    /// two.
     #[must_use]
     pub fn turning(&self) -> TurningRate {
         if self.motion.has_yaw_rate != 0 {
@@ -157,7 +163,7 @@ impl PlausibilityState {
         }
     }
 
-    /// The yaw rate to believe of one that comes so long after the last.
+    /// The yaw rate to use, if any, when `measured` arrives `passed` after the last one.
     pub(crate) fn accepted_yaw_rate(&mut self, measured: TurningRate, passed: Micros) -> Option<TurningRate> {
         let by_wheel = self.turning_by_wheel();
         let m = &mut self.motion;
@@ -165,13 +171,13 @@ impl PlausibilityState {
         m.yaw.judge(measured, last, by_wheel, m.speed, passed)
     }
 
-    /// The yaw rate is denied by a lane that moves as wheel angle and speed say.
+    /// Distrusts the yaw rate, because the lane moves as wheel angle and speed predict and the yaw rate does not.
     pub(crate) fn distrust_yaw_rate(&mut self) {
         self.motion.yaw.distrust();
         self.motion.has_yaw_rate = 0;
     }
 
-    /// How fast the wheel angle lets the vehicle turn where nothing pushes it.
+    /// The yaw rate by wheel angle and speed alone, without wind or bank.
     fn turning_by_wheel(&self) -> TurningRate {
         TurningRate::from_wide(product(
             self.motion.turning_gain.fixed(),
@@ -179,7 +185,7 @@ impl PlausibilityState {
         ))
     }
 
-    /// How long ago the column was checked last; no time if that is not known.
+    /// The time since the column was last checked; zero if it never was.
     pub(crate) fn since_column(&self, now: Instant) -> Micros {
         if self.column.is_known != 0 {
             now.since(self.column.at)
@@ -188,7 +194,7 @@ impl PlausibilityState {
         }
     }
 
-    /// Takes a wheel angle that is not checked yet.
+    /// Stores a wheel angle that arrived in this step and is checked in the next.
     pub(crate) fn set_wheel_angle(&mut self, wheel: Radians) {
         self.column.wheel = wheel;
     }
@@ -199,8 +205,8 @@ impl PlausibilityState {
         self.motion.speed
     }
 
-    /// Takes two speeds that come so long after the last. Whether they agree, and whether they did within
-    /// `SPEEDS_PATIENCE`.
+    /// Compares two speeds that arrive `passed` after the last ones. Returns whether they agree, and whether they
+    /// have agreed at some time within `SPEEDS_PATIENCE`.
     #[must_use]
     pub fn speeds_agree(&mut self, [a, b]: [Speed; 2], elapsed: Micros) -> (bool, bool) {
         let agree = speeds_agree(a, b);
@@ -213,7 +219,8 @@ impl PlausibilityState {
         (agree, apart <= SPEEDS_PATIENCE.us())
     }
 
-    /// What of a predicted movement was not seen, positive in its direction; negative where more was seen than was predicted.
+    /// The part of the predicted movement that was not observed, positive in its direction; negative where more was
+    /// observed than predicted.
     fn missing(&self) -> Metres {
         let missing = self.lane.predicted.minus(self.lane.seen);
         if self.lane.predicted < Metres::ZERO {
@@ -223,7 +230,7 @@ impl PlausibilityState {
         }
     }
 
-    /// Takes where the lane went on to without a picture.
+    /// Takes the extrapolated lane in place of a picture.
     pub(crate) fn accept_extrapolation(
         &mut self,
         motion_history: &mut MotionHistory,
@@ -234,29 +241,29 @@ impl PlausibilityState {
         self.lane.last = sample;
     }
 
-    /// The lane was lost: what comes next has no past.
+    /// Forgets the lane, which was lost: the next sample is compared with nothing.
     pub fn forget_lane(&mut self) {
         (self.lane.is_known, self.lane.predicted, self.lane.seen) = (0, Metres::ZERO, Metres::ZERO);
     }
 
-    /// The column was lost.
+    /// Forgets the column, which was lost.
     pub fn forget_column(&mut self) {
         (self.column.is_known, self.column.sum) = (0, AngularImpulse::ZERO);
     }
 }
 
-/// Largest honest change of the near-point error between two samples: 0.3 m, twenty times what 40 m/s and a
-/// yaw error of 0.1 rad give in 8.3 ms.
+/// Largest change of the near-point error between two samples that is accepted: 0.3 m, nine times the change in 8.3
+/// ms at 40 m/s and a yaw error of 0.1 rad.
 pub const LANE_STEP: Metres = Metres::from_m(0.3);
 /// Likewise for the yaw error: 0.1 rad in 8.3 ms would be 12 rad/s.
 pub const YAW_STEP: Radians = Radians::from_rad(0.1);
-/// Largest honest change of a speed between two messages: 1 m/s in 10 ms is 10 g.
+/// Largest change of a speed between two messages that is accepted: 1 m/s in 10 ms is 10 g.
 pub const SPEED_STEP: Speed = Speed::from_m_per_s(1.0);
-/// Change of a vehicle's speed in a second.
+/// Largest change of a vehicle's speed in a second.
 pub(crate) const BRAKES: Speed = Speed::from_m_per_s(12.0);
-/// For so long a wheel may slip: the brakes let it go within 0.1 s, and on ice within 0.3 s.
+/// How long a wheel may slip: anti-lock brakes release it within 0.1 s, and on ice within 0.3 s.
 pub(crate) const SPEEDS_PATIENCE: Micros = Micros::from_ms(300);
-/// Two sources that differ by this much are not both right.
+/// Two sources of the speed that differ by this much cannot both be right.
 const SPEED_SPREAD: Speed = Speed::from_m_per_s(2.0);
 
 /// Whether a new lane sample is no further from the last than a vehicle can move.
@@ -265,7 +272,7 @@ pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
     last.e_y.is_near(new.e_y, LANE_STEP) && last.e_theta.is_near(new.e_theta, YAW_STEP)
 }
 
-/// Whether a speed follows from the last one, which has been held for so long.
+/// Whether a vehicle can have reached the new speed from the last one, which has been held for the time `held`.
 #[must_use]
 pub fn speed_step_is_possible(last: Speed, new: Speed, held: Micros) -> bool {
     let braked = Speed::from_fixed(per_second(BRAKES.fixed(), held));
@@ -278,41 +285,44 @@ pub fn speeds_agree(a: Speed, b: Speed) -> bool {
     a.fixed().unsigned_dist(b.fixed()) < SPEED_SPREAD.fixed().unsigned_abs()
 }
 
-/// What a lane may miss of the motion predicted within a second.
+/// The part of the motion predicted within a second that may be missing.
 pub const LANE_MARGIN: Metres = Metres::from_m(0.4);
-/// What torques may lack on the column within a second.
+/// The momentum that may be unaccounted for within a second.
 pub const COLUMN_MARGIN: AngularImpulse = AngularImpulse::from_nm_s(0.6);
-/// So far within a second no vehicle goes beyond what its yaw rate says.
+/// Within a second no vehicle moves this much further than its yaw rate predicts.
 pub const UNREAL: Metres = Metres::from_m(0.8);
-/// The same by wheel angle and speed.
+/// The margins where the prediction comes from wheel angle and speed.
 const LANE_MARGIN_BY_WHEEL: Metres = Metres::from_m(1.0);
 const UNREAL_BY_WHEEL: Metres = Metres::from_m(2.0);
-/// Power assist: all that acts on the column is at most so many times the driver's torque.
+/// Driver torque and power assist together are at most this many times the driver torque.
 pub const ASSIST: i32 = 5;
-/// Friction of the column, and what else holds it without a sign.
+/// Friction of the column, and other torques whose direction is not known.
 pub const FRICTION: Torque = Torque::from_nm(0.5);
-/// What is beyond these is as wrong as they are: driver and aligning torque, and what damping takes in the time between two
-/// checks. With them, and a guidance of 5 N.m that its frame has room for, no sum of the column check reaches 128, the end
-/// of an I8F24: 100 + 5 + 16.3 at most before the time, which at least halves it, and 60.7 + 60 + 0.3 + 2.7 after.
+/// Driver torque, aligning torque and the impulse of the damping between two checks are cut to these values; anything
+/// larger is as implausible as they are. With these bounds, and a guidance of 5 N.m that its frame has room for, no
+/// sum of the column check reaches 128, the end of an I8F24: 100 + 5 + 16.3 at most before the time, which at least
+/// halves it, and 60.7 + 60 + 0.3 + 2.7 after.
 const MOST_DRIVER: Torque = Torque::from_nm(20.0);
 const MOST_ALIGNING: I8F24 = Torque::from_nm(16.0).fixed();
 const MOST_DAMPED: I8F24 = AngularImpulse::from_nm_s(60.0).fixed();
-/// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank.
+/// The aligning torques by yaw rate and by wheel angle may differ by this much because of wind or bank.
 pub const PUSHED: Torque = Torque::from_nm(0.3);
-/// So much of the aligning torque may be wrong: 77/256, 30 %.
+/// The share of the aligning torque that may be wrong: 77/256, 30 %.
 pub const ALIGNING_ERROR: Ratio = Ratio::from_si(77.0 / 256.0);
 const ALIGNING_SHARE: I0F32 = I0F32::from_bits(ALIGNING_ERROR.bits() << 8);
 /// Inertia of column and wheel: 2^-3 kg.m2, a little more than the 0.11 of table 9.
 const INERTIA_SHIFT: u32 = 3;
-/// Bounds of what is learnt slowly: a bank of 5 %, or a pull; 5 mrad of camera and yaw rate at 30 m/s.
+/// Bound of the long-run imbalance of the column: a bank of 5 %, or a pull to one side.
 pub const COLUMN_BIAS: Torque = Torque::from_nm(0.5);
-/// Likewise of the lane, and by wheel angle and speed: 1.5 deg of the wheel, and a bank of 5 %.
+/// Bounds of the long-run error of the lane's prediction. With a yaw rate: 5 mrad of camera mounting at 30 m/s; by
+/// wheel angle and speed: 1.5 deg of wheel offset and a bank of 5 %.
 pub const LANE_BIAS: Speed = Speed::from_m_per_s(0.15);
 const LANE_BIAS_BY_WHEEL: Speed = Speed::from_m_per_s(0.5);
 
 impl Plausibility {
-    /// Takes the speed in use and the yaw rate that is believed; returns nothing, for neither has a counterpart here. How fast
-    /// the vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle model.
+    /// Takes the speed in use and the trusted yaw rate. It returns nothing, as neither is checked here. The yaw rate
+    /// per wheel angle at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle
+    /// model.
     pub fn motion(&self, state: &mut PlausibilityState, speed: Speed, yaw_rate: Option<TurningRate>) {
         let is_known = speed == state.motion.speed;
         state.motion.has_yaw_rate = u32::from(yaw_rate.is_some());
@@ -323,7 +333,7 @@ impl Plausibility {
         }
         let v = speed.fixed();
         let slip = product_of_three(product(v, v), self.stability_factor.fixed());
-        // 82 at most: at 90 m/s with the largest factor.
+        // At most 82, which it reaches at 90 m/s with the largest stability factor.
         let divisor = u32::try_from(slip.saturating_add(I40F24::ONE).to_bits()).unwrap_or(0);
         let gain = self.curvature_gain.fixed().wide_mul(v).to_bits();
         state.motion.turning_gain = TurningRatePerAngle::from_bits(signed_quotient(gain, divisor));
@@ -350,7 +360,7 @@ impl Plausibility {
                 product_within(lateral, self.aligning_gain.fixed(), MOST_ALIGNING)
             };
             let aligning = aligning_at(state.turning());
-            // A yaw rate that pictures and wheel angle deny may be as wrong as it is large.
+            // A yaw rate that contradicts both pictures and wheel angle may be wrong by its whole value.
             let pushed = if state.lane.is_alive != 0 && state.motion.yaw.is_suspect() {
                 MOST_ALIGNING
             } else {
@@ -360,7 +370,7 @@ impl Plausibility {
                 .max(aligning.wrapping_sub(pushed))
                 .min(aligning.wrapping_add(pushed));
             let applied = applied.fixed();
-            // What driver and assist may give together.
+            // From here on: the range of driver torque and power assist together.
             let driver = driver.within(MOST_DRIVER).fixed();
             let assisted = driver.wrapping_mul_int(ASSIST);
             let least = applied
@@ -370,7 +380,7 @@ impl Plausibility {
                 .wrapping_add(driver.max(assisted))
                 .wrapping_sub(aligning.min(by_wheel));
             let damped = product_within(moved, self.column_damping.fixed(), MOST_DAMPED);
-            // All times dt, for the wheel's movement is that of dt.
+            // Torques are multiplied by dt, because the movement of the wheel is that within dt.
             let impulse = |torque: I8F24| per_second(torque, dt);
             let (least, most) = (
                 impulse(least).wrapping_sub(damped),
@@ -383,7 +393,8 @@ impl Plausibility {
             let tolerance =
                 I8F24::wrapping_from_num(aligning.max(aligning.wrapping_neg()).wide_mul(ALIGNING_SHARE));
             let tolerance = impulse(tolerance.wrapping_add(FRICTION.fixed()));
-            // The tolerance is that of the sum: what is not used up between two pushes explains a part of the last.
+            // The tolerance is that of the sum: the part that is not needed between two pushes may explain a part of
+            // the earlier one.
             let sum = state.column.sum.fixed();
             let (least, most) = (
                 leak(sum, lacking.wrapping_sub(tolerance), dt),
@@ -395,7 +406,7 @@ impl Plausibility {
         (state.column.wheel, state.column.checked) = (wheel, wheel);
         let sum = state.column.sum;
         let above = sum.abs().fixed().wrapping_sub(COLUMN_MARGIN.fixed());
-        // Inertia times way over time is the wheel's momentum, in the direction of the sum.
+        // Inertia times angle over time is the momentum of the wheel, counted in the direction of the sum.
         let along = if sum < AngularImpulse::ZERO {
             I8F24::ZERO.saturating_sub(moved)
         } else {
@@ -404,7 +415,8 @@ impl Plausibility {
         above <= I8F24::ZERO || per_second(above, dt) <= along.wrapping_shr(INERTIA_SHIFT)
     }
 
-    /// Takes a new lane sample that came now, and says whether its error moved as it must have. Apart, as [`Self::column`].
+    /// Takes a lane sample that arrived in this step, and says whether its error moved as predicted. Not inlined, for
+    /// the reason given at [`Self::column`].
     #[must_use]
     #[inline(never)]
     pub fn lane(
@@ -416,7 +428,7 @@ impl Plausibility {
     ) -> LaneMotion {
         motion_history.record_line(now, sample.at, sample.e_theta);
         let measured = state.motion.has_yaw_rate != 0;
-        // By wheel angle and speed a bank, a gust or a tyre is a movement that does not come.
+        // Predicted from wheel angle and speed, a movement may be missing because of a bank, a gust or a tyre.
         let (margin, unreal, most) = if measured {
             (LANE_MARGIN, UNREAL, LANE_BIAS)
         } else {
@@ -426,7 +438,7 @@ impl Plausibility {
         if state.lane.is_known != 0 && dt.us() != 0 {
             let seen = sample.e_y.minus(state.lane.last.e_y).fixed();
             let rate = self.line_rate(state, motion_history, now, state.lane.last.at);
-            // Where the line is not known for long enough, nothing is predicted.
+            // Where the line has not been known for long enough, the observed change counts as the prediction.
             let predicted = rate.map_or(seen, |rate| per_second(rate, dt));
             let bias = state.lane.bias.fixed();
             let predicted = predicted.saturating_add(per_second(bias, dt));
@@ -438,15 +450,16 @@ impl Plausibility {
             state.lane.is_alive = u32::from(seen != I8F24::ZERO || sample.e_theta != state.lane.last.e_theta);
         }
         (state.lane.is_known, state.lane.last) = (1, sample);
-        // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. A large one is: no
-        // vehicle goes there.
+        // A missing movement counts only if more than half the margin was predicted. A movement that was not
+        // predicted proves a fault only where it is larger than any vehicle's.
         let (predicted, missing) = (state.lane.predicted, state.missing());
         let is_missing = missing > margin && predicted.abs().fixed() > margin.fixed().wrapping_shr(1);
         if !is_missing && missing.abs() <= unreal {
             return LaneMotion::Consistent;
         }
-        // A yaw rate that is too large predicts so much less: over the time from near to far point, and at the near point. What it
-        // does so comes up to 0.4 s later, so that a quarter of what is missing is enough.
+        // A yaw rate that is too large makes the predicted movement smaller, through the distance to the far point.
+        // This effect is complete only 0.4 s later, so it is enough if the yaw rate explains a quarter of the
+        // discrepancy.
         let far = saturate(product(self.far_time.fixed(), state.motion.speed.fixed()));
         let less = product_below(far, state.motion.yaw.sum.fixed());
         let is_too_much = predicted >= state.lane.seen;
@@ -462,7 +475,8 @@ impl Plausibility {
         LaneMotion::Inconsistent
     }
 
-    /// How fast the near-point error must move at an instant, m/s, by the measured yaw rate.
+    /// The rate that the near-point error must have at an instant, m/s, by the measured yaw rate and the direction of
+    /// the line.
     fn line_rate(
         &self,
         state: &PlausibilityState,
@@ -477,15 +491,15 @@ impl Plausibility {
         Some(along.saturating_sub(product_below(reach, turning.fixed())))
     }
 
-    /// How fast it must move where the line bends as the vehicle turns, m/s.
+    /// The same rate where the line's direction is not known: it is assumed to bend as the vehicle turns.
     fn bend_rate(&self, state: &PlausibilityState, e_theta: Radians) -> I8F24 {
         let heading = saturate(product(state.motion.speed.fixed(), e_theta.fixed()));
         let far = saturate(product(self.far_time.fixed(), state.motion.speed.fixed()));
         heading.saturating_sub(product_below(far, state.turning().fixed()))
     }
 
-    /// The lane at an instant after a sample of it, along the line that the far point has passed and by the rate of turn: what
-    /// a picture would show that does not come.
+    /// The lane that a missing picture would show: the last sample, moved to a later instant along the known line and
+    /// by the yaw rate.
     #[must_use]
     pub fn extrapolated_lane(
         &self,
@@ -516,15 +530,15 @@ impl Plausibility {
 /// How the near-point error moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LaneMotion {
-    /// As everything says.
+    /// As predicted.
     Consistent,
-    /// As wheel angle and speed say, and not as the yaw rate does.
+    /// As wheel angle and speed predict, but not as the yaw rate does.
     ContradictsYawRate,
-    /// As nothing says.
+    /// As neither predicts.
     Inconsistent,
 }
 
-/// What of an interval is nearest to zero: zero itself if it is inside.
+/// The value of an interval that is nearest to zero; zero itself if the interval contains it.
 fn nearest_to_zero(least: I8F24, most: I8F24) -> I8F24 {
     least.max(I8F24::ZERO).wrapping_add(most.min(I8F24::ZERO))
 }

@@ -1,4 +1,4 @@
-//! Ramps: the last trusted torque, and its way to zero.
+//! Ramps that take the last trusted torque to zero.
 //!
 //! A sudden loss of guidance in a curve takes a relying driver 0.44 to 0.62 m off the centreline; the same
 //! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/decisions has the
@@ -10,21 +10,24 @@ use fixed::types::I8F24;
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, share_of, signed_quotient};
 use crate::safety::redundant::words;
 
-/// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
+/// How long a handover lasts. With 0.12 s the vehicle goes almost as far as after a sudden loss; with 3 s it
+/// overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
-/// Its least length after the lane was extrapolated.
+/// How long a handover lasts at least after the lane was extrapolated.
 pub const GONE_ON: Micros = Micros::from_ms(1000);
-/// Without a driver torque the override limit cannot act, so a handover goes so many times as fast: 1 s.
+/// How many times as fast a handover is without a driver torque, where the override limit cannot act: it takes 1 s.
 const WITHOUT_COLUMN: u32 = 2;
-/// An implausible column may hide a driver who pushes, so a handover takes 0.5 s. From 5 N.m the reduction limit is slower.
+/// How many times as fast a handover is with an implausible column, which may hide a driver who pushes: it takes 0.5
+/// s, or longer from 5 N.m, where the reduction limit holds it.
 const IMPLAUSIBLE_COLUMN: u32 = 4;
-/// Where the driver pushes against the torque, a handover goes so many times as fast. From 5 N.m that is 7.5 N.m/s: the largest whole
-/// number that keeps the reduction limit.
+/// How many times as fast a handover is while the driver pushes against the torque. From 5 N.m that is 7.5 N.m/s: the
+/// largest whole number that keeps the reduction limit.
 pub const OPPOSED: u32 = 3;
-/// An opposing driver torque beyond this is a push: the largest offset of an ordinary torque sensor.
+/// A larger opposing driver torque counts as a push: this is the largest offset of an ordinary torque sensor.
 pub const OPPOSES: Torque = Torque::from_nm(0.1);
 
-/// How many times as fast a handover goes, by the driver torque, `None` if it is not known, and whether the column is plausible.
+/// How many times as fast a handover is. It depends on the driver torque, `None` if that is not known, and on whether
+/// the column is plausible.
 #[must_use]
 pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 {
     if !is_plausible {
@@ -45,8 +48,9 @@ pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 
     }
 }
 
-/// The length of a handover after the trust in the lane has fallen so far. Trust without a picture falls as a handover does, so that
-/// this continues the same line; but a driver needs [`GONE_ON`] to take over.
+/// The length of a handover that begins when the trust in the lane has already fallen. Without a picture trust falls
+/// as fast as the torque of a handover, so this continues the same straight line; but it takes at least [`GONE_ON`],
+/// which a driver needs to take over.
 #[must_use]
 pub fn handover_length(trust: Ratio) -> Micros {
     let left = share_of(trust.fixed(), I8F24::from_bits(HANDOVER.us().cast_signed()));
@@ -63,7 +67,7 @@ words! {
 }
 
 impl Ramp {
-    /// Already at zero.
+    /// A ramp that has ended.
     pub const NONE: Self = Self {
         from: Torque::ZERO,
         length: Micros::from_us(1),
@@ -91,12 +95,12 @@ impl Ramp {
         )
     }
 
-    /// The torque after another `elapsed`.
+    /// Advances by `elapsed` and returns the torque.
     #[must_use]
     pub fn step(&mut self, elapsed: Micros) -> Torque {
         self.done = Micros::from_us(self.done.us().saturating_add(elapsed.us()));
         let left = i64::from(self.length.us().saturating_sub(self.done.us()));
-        // 32 bits times 31.
+        // A product of 32 and 31 bits fits in 64.
         let torque = i64::from(self.from.bits()).wrapping_mul(left);
         // The length is never zero by construction; a division that truncates never grows the torque.
         Torque::from_bits(signed_quotient(torque, self.length.us()))

@@ -1,46 +1,48 @@
-//! Whether the yaw rate is believed.
+//! Checks whether the yaw rate can be trusted.
 //!
-//! The lane is judged by it ([`crate::safety::plausibility`]), so it is judged itself: no vehicle turns as fast, or changes its turning as
-//! fast, as the first two bounds say; and where wheel angle and speed say that the vehicle goes by the bicycle model, what differs
-//! from that model, but for a constant that is learnt slowly, is summed with a memory of 1 s. What fails is not believed until it
-//! has agreed for a while, and guidance goes on without.
+//! The lane is checked against the yaw rate ([`crate::safety::plausibility`]), so the yaw rate is checked first. Two
+//! bounds hold for any vehicle: on the change between two messages, and on the lateral acceleration. A third check
+//! compares it with the bicycle model, where wheel angle and speed ask for so little that the model holds: the
+//! difference, less a constant that is learnt slowly, is summed with a time constant of 1 s. A yaw rate that fails is
+//! not used until it has agreed with the model for 3 s; guidance goes on without it.
 
 use fixed::types::I40F24;
 
 use crate::quantity::{Micros, Radians, Speed, TurningRate, leak, per_second, product};
 use crate::safety::redundant::words;
 
-/// Largest honest change of the yaw rate between two messages: a swerve has 4 rad/s2, which is 0.1 rad/s in 25 ms.
+/// Largest change of the yaw rate between two messages that is accepted: a swerve has 4 rad/s2, which is 0.1 rad/s in
+/// 25 ms.
 pub const STEP: TurningRate = TurningRate::from_rad_per_s(0.15);
-/// Largest honest product of speed and yaw rate, m/s2.
+/// Largest product of speed and yaw rate (lateral acceleration) that is accepted, m/s2.
 pub const MOST_SIDEWAYS: u32 = 12;
-/// For so long a yaw rate beyond these is left out.
+/// How long a yaw rate beyond these two bounds is replaced by the last accepted one; then it is distrusted.
 const PATIENCE: Micros = Micros::from_ms(100);
-/// Where less than this is asked for by wheel angle and speed, m/s2, the bicycle model holds.
+/// The bicycle model holds where wheel angle and speed give a smaller lateral acceleration than this, m/s2.
 pub const ORDINARY_SIDEWAYS: u32 = 3;
-/// What may be summed beside a quarter of the rates themselves: a gust of 1 kN makes 0.015 rad.
+/// Margin of the summed difference, to which a quarter of the larger rate is added. A gust of 1 kN makes 0.015 rad.
 pub const MARGIN: Radians = Radians::from_rad(0.03);
-/// What may differ in the long run: a bank of 8 % and 1.5 deg of the wheel.
+/// Bound of the long-run difference: a bank of 8 % and a wheel offset of 1.5 deg.
 pub const BIAS: TurningRate = TurningRate::from_rad_per_s(0.025);
-/// What a check is wrong by in the long run is learnt within 2^4 s.
+/// The long-run error of a check is learnt with a time constant of 2^4 s. The checks of lane and column use the same.
 pub const BIAS_SHIFT: u32 = 4;
-/// For so long it has to agree, within half of the margin, to be believed again.
+/// How long a distrusted yaw rate has to agree with the model, within half of the margin, before it is used again.
 const DISTRUST: Micros = Micros::from_ms(3000);
 
 words! {
-    /// What is remembered of the yaw rates that came.
+    /// What the check remembers of earlier yaw rates.
     pub(crate) struct YawState {
-        /// What they are more than wheel angle and speed say: in the long run, and summed.
+        /// The difference between the measured yaw rate and the model's: its long-run value, and the sum of the rest.
         pub(crate) bias: TurningRate,
         pub(crate) sum: Radians,
-        /// For how long impossible ones have been left out, and for how long none is believed.
+        /// For how long impossible yaw rates have been replaced; and how much longer the yaw rate is distrusted.
         held: Micros,
         distrust: Micros,
     }
 }
 
 impl YawState {
-    /// None came.
+    /// No yaw rate has arrived.
     pub(crate) const NEW: Self = Self {
         bias: TurningRate::ZERO,
         sum: Radians::ZERO,
@@ -48,22 +50,23 @@ impl YawState {
         distrust: Micros::from_us(0),
     };
 
-    /// None is believed for a while.
+    /// Distrusts the yaw rate until it has agreed for [`DISTRUST`].
     pub(crate) fn distrust(&mut self) {
         self.distrust = DISTRUST;
     }
 
-    /// Whether none is believed.
+    /// Whether the yaw rate is distrusted.
     pub(crate) fn is_distrusted(&self) -> bool {
         self.distrust.us() > 0
     }
 
-    /// Whether wheel angle and speed say something else, by a quarter of the margin.
+    /// Whether the summed difference from the model is above a quarter of the margin.
     pub(crate) fn is_suspect(&self) -> bool {
         self.sum.abs().fixed() > MARGIN.fixed().wrapping_shr(2)
     }
 
-    /// The yaw rate to believe of one that comes so long after the last.
+    /// The yaw rate to use when `measured` arrives `passed` after the last message: itself, the last accepted one, or
+    /// none.
     pub(crate) fn judge(
         &mut self,
         measured: TurningRate,
@@ -91,7 +94,8 @@ impl YawState {
         (!self.is_distrusted()).then_some(measured)
     }
 
-    /// Whether it agrees with wheel angle and speed, within half of the margin. Beyond the margin none is believed.
+    /// Whether the measured yaw rate agrees with the model's within half of the margin. Beyond the whole margin it is
+    /// distrusted.
     fn agrees(&mut self, measured: TurningRate, by_wheel: TurningRate, passed: Micros) -> bool {
         let differs = measured.minus(by_wheel).minus(self.bias).fixed();
         let sum = leak(self.sum.fixed(), per_second(differs, passed), passed);

@@ -1,7 +1,8 @@
-//! Counts of rejected frames by message and reason: they show a sender with a wrong data ID, or forged frames. [`Rejection`]
-//! reports them on the bus, one pair after the other.
+//! Counts of rejected frames for each pair of message and reason. They reveal a sender with a wrong data ID, or
+//! forged frames. [`Rejection`] reports one pair after the other on the bus.
 //!
-//! Outside the torque path, and not kept twice: it moves nothing. Fixed arrays, so that a flipped bit spoils a count.
+//! The counts are outside the torque path and not kept twice, as no torque depends on them. The array is of fixed
+//! size, so that a flipped bit can only spoil a count.
 
 use crate::bus::Reject;
 use crate::bus::messages::{MESSAGES, Rejection};
@@ -13,7 +14,7 @@ const PAIRS: usize = MESSAGES.len() * REASONS;
 #[derive(Debug, Clone)]
 pub struct Rejections {
     counts: [u16; PAIRS],
-    /// The pair to look at next.
+    /// The pair that is reported next, if its count is not zero.
     next: usize,
 }
 
@@ -40,14 +41,14 @@ impl Rejections {
         }
     }
 
-    /// Of all messages, for all reasons, saturating.
+    /// The sum over all messages and reasons, saturating.
     #[must_use]
     pub fn total(&self) -> u32 {
         let counts = self.counts.iter().map(|count| u32::from(*count));
         counts.fold(0, u32::saturating_add)
     }
 
-    /// The next pair with a count, in turn.
+    /// The next pair, in turn, whose count is not zero.
     pub fn line(&mut self) -> Option<Rejection> {
         for _ in 0..PAIRS {
             let place = self.next % PAIRS;

@@ -40,7 +40,7 @@ pub(crate) struct Drive<'a> {
 
 impl Drive<'_> {
     /// Hands that are never quite still, and a probe that nothing limits.
-    pub(crate) fn of(params: Params) -> Self {
+    pub(crate) fn new(params: Params) -> Self {
         Self {
             params,
             t_nms_s: params.t_nms_s,

@@ -11,7 +11,7 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod target {
-    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use cortex_m_rt::entry;
     use haptic_core::bus::messages::ResetCause;
     use haptic_core::ecu::Ecu;
     use haptic_core::ecu::injection::Region;
@@ -70,13 +70,5 @@ mod target {
         deeper(frame[3].wrapping_add(1)).wrapping_add(frame[7])
     }
 
-    #[panic_handler]
-    fn panic(info: &core::panic::PanicInfo) -> ! {
-        product::on_panic(info)
-    }
-
-    #[exception]
-    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-        product::on_fault()
-    }
+    haptic_firmware::stop_on_panic_and_fault!();
 }

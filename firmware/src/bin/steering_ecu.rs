@@ -9,7 +9,7 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod target {
-    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use cortex_m_rt::entry;
     use haptic_core::ecu::Ecu;
     use haptic_firmware::product;
 
@@ -20,13 +20,5 @@ mod target {
         product::run(ECU, |_, _, _| {})
     }
 
-    #[panic_handler]
-    fn panic(info: &core::panic::PanicInfo) -> ! {
-        product::on_panic(info)
-    }
-
-    #[exception]
-    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-        product::on_fault()
-    }
+    haptic_firmware::stop_on_panic_and_fault!();
 }

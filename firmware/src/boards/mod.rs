@@ -2,6 +2,8 @@
 //!
 //! A board is chosen by the feature of its name. A new board is a new file here, a feature, and a memory map.
 
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
 use embedded_storage::nor_flash::NorFlash;
@@ -121,4 +123,22 @@ pub trait Board: Sized {
 
     /// Writes bytes of the log; waits for the log port.
     fn log(bytes: &[u8]);
+}
+
+/// SysTick at 1 kHz, from the core's clock.
+fn start_systick(systick: &mut SYST, core_clock_hz: u32) {
+    systick.set_clock_source(SystClkSource::Core);
+    systick.set_reload(core_clock_hz / 1000 - 1);
+    systick.clear_current();
+    systick.enable_interrupt();
+    systick.enable_counter();
+}
+
+/// Bytes of the log for the debug probe (RTT).
+#[cfg(any(feature = "nucleo-g474re", feature = "sam-e54-xpro"))]
+fn log_to_probe(bytes: &[u8]) {
+    // SAFETY: one core, and nothing else has the channel.
+    if let Some(mut channel) = unsafe { rtt_target::UpChannel::conjure(0) } {
+        channel.write(bytes);
+    }
 }

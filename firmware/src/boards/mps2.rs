@@ -14,7 +14,6 @@ use core::convert::Infallible;
 use core::mem::MaybeUninit;
 
 use cortex_m::interrupt::InterruptNumber;
-use cortex_m::peripheral::syst::SystClkSource;
 
 use cortex_m::peripheral::{NVIC, Peripherals, SCB, SYST};
 use cortex_m_rt::exception;
@@ -24,13 +23,12 @@ use embedded_hal_nb::serial::{self, Read, Write};
 use haptic_core::quantity::Instant;
 use volatile_register::{RO, RW};
 
-use super::{Board, WATCHDOG};
+use super::{Board, WATCHDOG, start_systick};
 use crate::nor::{Nor, PAGE};
 use crate::slcan_can::SlcanCan;
 use crate::{reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 25_000_000;
-const TICK_HZ: u32 = 1000;
 /// Cycles between two looks for work, 2.5 us.
 const BETWEEN_GLANCES: u32 = 64;
 
@@ -124,11 +122,7 @@ impl Board for Mps2 {
     }
 
     fn start_tick(&mut self) {
-        self.systick.set_clock_source(SystClkSource::Core);
-        self.systick.set_reload(CORE_CLOCK_HZ / TICK_HZ - 1);
-        self.systick.clear_current();
-        self.systick.enable_interrupt();
-        self.systick.enable_counter();
+        start_systick(&mut self.systick, CORE_CLOCK_HZ);
     }
 
     fn tick(&mut self) -> bool {

@@ -27,7 +27,6 @@ use core::future::Future;
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 
-use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, Peripherals, SCB, SYST};
 use cortex_m_rt::exception;
 use embassy_stm32::adc::{Adc, SampleTime};
@@ -48,13 +47,12 @@ use embedded_hal_nb::nb;
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, ResetCause};
 use haptic_core::quantity::{Instant, Torque};
-use rtt_target::{ChannelMode, UpChannel, rtt_init};
+use rtt_target::{ChannelMode, rtt_init};
 
-use super::{Board, WATCHDOG};
+use super::{Board, WATCHDOG, log_to_probe, start_systick};
 use crate::{analogue, eccr, image, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 170_000_000;
-const TICK_HZ: u32 = 1000;
 const BITRATE: u32 = 500_000;
 
 bind_interrupts!(struct Interrupts {
@@ -189,11 +187,7 @@ impl Board for NucleoG474re {
     }
 
     fn start_tick(&mut self) {
-        self.systick.set_clock_source(SystClkSource::Core);
-        self.systick.set_reload(CORE_CLOCK_HZ / TICK_HZ - 1);
-        self.systick.clear_current();
-        self.systick.enable_interrupt();
-        self.systick.enable_counter();
+        start_systick(&mut self.systick, CORE_CLOCK_HZ);
     }
 
     fn tick(&mut self) -> bool {
@@ -249,10 +243,7 @@ impl Board for NucleoG474re {
     }
 
     fn log(bytes: &[u8]) {
-        // SAFETY: one core, and nothing else has the channel.
-        if let Some(mut channel) = unsafe { UpChannel::conjure(0) } {
-            channel.write(bytes);
-        }
+        log_to_probe(bytes);
     }
 }
 

@@ -30,7 +30,6 @@ use atsamd_hal::pac::{self, Interrupt, NVIC};
 use atsamd_hal::prelude::{_embedded_hal_watchdog_Watchdog, _embedded_hal_watchdog_WatchdogEnable};
 use atsamd_hal::watchdog::{Watchdog, WatchdogTimeout};
 use atsamd_hal::{ResetCause, reset_cause};
-use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SCB, SYST};
 use embedded_can::nb::Can;
 use embedded_can::{Error, ErrorKind};
@@ -50,13 +49,12 @@ use mcan::interrupt::{Interrupt as CanInterrupt, OwnedInterruptSet};
 use mcan::message::{rx, tx};
 use mcan::messageram::{Capacities, SharedMemory};
 use mcan::prelude::*;
-use rtt_target::{ChannelMode, UpChannel, rtt_init};
+use rtt_target::{ChannelMode, rtt_init};
 
-use super::Board;
+use super::{Board, log_to_probe, start_systick};
 use crate::{image, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 120_000_000;
-const TICK_HZ: u32 = 1000;
 
 /// The board's peripherals, taken.
 pub struct SamE54Xpro {
@@ -126,14 +124,6 @@ impl Board for SamE54Xpro {
         }
     }
 
-    fn can(&mut self) -> &mut Self::Can {
-        &mut self.can
-    }
-
-    fn status(&mut self) -> &mut Self::Status {
-        &mut self.led
-    }
-
     /// No blocks at the end of the flash given to the chip's own emulation of an EEPROM, and all of 1 MiB there.
     fn has_expected_options(&self) -> bool {
         // SAFETY: a look at what the HAL's driver owns.
@@ -151,6 +141,14 @@ impl Board for SamE54Xpro {
         ];
         // SAFETY: always readable, and never written.
         image::number_of(&SERIAL.map(|word| unsafe { word.read_volatile() }))
+    }
+
+    fn can(&mut self) -> &mut Self::Can {
+        &mut self.can
+    }
+
+    fn status(&mut self) -> &mut Self::Status {
+        &mut self.led
     }
 
     fn flash(&mut self) -> &mut Self::Flash {
@@ -179,11 +177,7 @@ impl Board for SamE54Xpro {
         // From here on nobody writes the flash behind the cache's back.
         // SAFETY: nothing else has the cache.
         unsafe { pac::Cmcc::steal() }.ctrl().write(|w| w.cen().set_bit());
-        self.systick.set_clock_source(SystClkSource::Core);
-        self.systick.set_reload(CORE_CLOCK_HZ / TICK_HZ - 1);
-        self.systick.clear_current();
-        self.systick.enable_interrupt();
-        self.systick.enable_counter();
+        start_systick(&mut self.systick, CORE_CLOCK_HZ);
     }
 
     fn tick(&mut self) -> bool {
@@ -217,10 +211,7 @@ impl Board for SamE54Xpro {
     fn zero_torque() {}
 
     fn log(bytes: &[u8]) {
-        // SAFETY: one core, and nothing else has the channel.
-        if let Some(mut channel) = unsafe { UpChannel::conjure(0) } {
-            channel.write(bytes);
-        }
+        log_to_probe(bytes);
     }
 }
 

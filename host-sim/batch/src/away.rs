@@ -33,10 +33,10 @@ impl Away {
         if scenario.condition() == Condition::Manual {
             return Self::default();
         }
-        stretches(trace).map_or_else(Self::default, |found| Self::of(&found))
+        stretches(trace).map_or_else(Self::default, |found| Self::from_stretches(&found))
     }
 
-    fn of(stretches: &[Unguided]) -> Self {
+    fn from_stretches(stretches: &[Unguided]) -> Self {
         let told = stretches.iter().find(|stretch| !stretch.asked_for);
         let told = told.or(stretches.first());
         Self {
@@ -123,15 +123,15 @@ mod tests {
 
     #[test]
     fn what_the_ecu_decides_is_told_before_what_was_asked() {
-        assert_eq!(Away::of(&[]).texts().join(","), ",,,0");
-        let asked = Away::of(&[stretch(40.0, None, Cause::TorqueLost)]);
+        assert_eq!(Away::from_stretches(&[]).texts().join(","), ",,,0");
+        let asked = Away::from_stretches(&[stretch(40.0, None, Cause::TorqueLost)]);
         assert!(!asked.is_by_itself());
         assert_eq!(asked.texts().join(","), "40,torque lost,,60");
         assert_eq!(
             asked.when_and_why().unwrap(),
             "at 40.0 s as asked: torque lost, not back"
         );
-        let both = Away::of(&[
+        let both = Away::from_stretches(&[
             stretch(10.0, Some(20.0), Cause::RequestEnded),
             stretch(52.5, Some(60.0), HANDS_OFF),
         ]);
@@ -145,8 +145,8 @@ mod tests {
 
     #[test]
     fn a_few_runs_are_named_and_the_rest_is_counted() {
-        let left = Away::of(&[stretch(30.0, None, HANDS_OFF)]);
-        let asked = Away::of(&[stretch(30.0, None, Cause::LaneLost)]);
+        let left = Away::from_stretches(&[stretch(30.0, None, HANDS_OFF)]);
+        let asked = Away::from_stretches(&[stretch(30.0, None, Cause::LaneLost)]);
         assert_eq!(left_by_themselves([(&asked, "a".into())]), None);
         let runs = |count: usize| {
             let names = (0..count).map(|number| (&left, number.to_string()));

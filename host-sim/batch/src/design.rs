@@ -16,9 +16,9 @@ use serde::Serialize;
 use crate::error::{StudyError, refuse};
 use crate::experiment::{Probe, guided_drive, log_each, recorded, truth_of};
 
-/// What is asked.
+/// The drives, courses and probes to choose from, and the error to reach.
 #[derive(Debug, Clone)]
-pub struct Question {
+pub struct DesignRequest {
     /// Numbers of the participants that stand for the drivers to come.
     pub participants: Vec<u32>,
     /// Courses to choose from.
@@ -73,9 +73,9 @@ pub struct Confirmation {
     pub coverage: f64,
 }
 
-/// The answer.
+/// Every design with its errors, and the best one.
 #[derive(Debug, Clone, Serialize)]
-pub struct Answer {
+pub struct DesignResult {
     /// Key of the parameter.
     pub parameter: String,
     /// Error asked for.
@@ -103,13 +103,13 @@ struct Cell {
 
 /// What the drives of each course, probe and driver tell.
 fn cells(
-    question: &Question,
+    request: &DesignRequest,
     drivers: &[(u32, PublishedDriver)],
     probes: &[Option<Probe>],
     done: impl Fn() + Sync,
 ) -> Result<Vec<Cell>, StudyError> {
     let mut jobs = Vec::new();
-    for course in 0..question.courses.len() {
+    for course in 0..request.courses.len() {
         for &probe in probes {
             for &(number, driver) in drivers {
                 jobs.push((course, probe, number, driver));
@@ -118,10 +118,10 @@ fn cells(
     }
     log_each(
         &jobs,
-        question.seed,
+        request.seed,
         |&(course, probe, number, driver)| {
-            let seed = question.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
-            guided_drive(&driver, Some(&question.courses[course]), probe, seed)
+            let seed = request.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
+            guided_drive(&driver, Some(&request.courses[course]), probe, seed)
         },
         |driven, &(course, probe, _, driver)| {
             done();
@@ -135,23 +135,23 @@ fn cells(
     )
 }
 
-/// Answers `question`; `done` is called after each drive.
+/// Computes the designs of `request`; `done` is called after each drive.
 ///
 /// # Errors
 /// An unknown participant or parameter; a course that cannot be driven.
-pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, StudyError> {
-    let Some(place) = INFORMED[..5].iter().position(|&n| n == question.parameter) else {
+pub fn design(request: &DesignRequest, done: impl Fn() + Sync) -> Result<DesignResult, StudyError> {
+    let Some(place) = INFORMED[..5].iter().position(|&n| n == request.parameter) else {
         return refuse(format!(
             "parameter {:?} is unknown, one of {} is wanted",
-            question.parameter,
+            request.parameter,
             INFORMED[..5].join(", ")
         ));
     };
-    let drivers = drivers(&question.participants)?;
-    let probes = probes(question);
-    let cells = cells(question, &drivers, &probes, &done)?;
+    let drivers = drivers(&request.participants)?;
+    let probes = probes(request);
+    let cells = cells(request, &drivers, &probes, &done)?;
     let mut designs = Vec::new();
-    for (course, road) in question.courses.iter().enumerate() {
+    for (course, road) in request.courses.iter().enumerate() {
         let of = |probe: Option<Probe>| -> Vec<&Information> {
             let here = cells.iter().filter(|c| c.course == course && c.probe == probe);
             here.map(|c| &c.information).collect()
@@ -167,11 +167,11 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Stu
             let frequencies = probe.map(|p| p.frequency_hz).into_iter().collect();
             designs.push(Design {
                 left_by_itself: left(&[probe]),
-                ..Design::new(question, place, road, probe, frequencies, &all)
+                ..Design::new(request, place, road, probe, frequencies, &all)
             });
         }
         // The slowest and the fastest of each amplitude, half the drive each.
-        for &amplitude_nm in &question.amplitudes_nm {
+        for &amplitude_nm in &request.amplitudes_nm {
             let same: Vec<Probe> = probes
                 .iter()
                 .flatten()
@@ -191,7 +191,7 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Stu
             let frequencies = vec![slow.frequency_hz, fast.frequency_hz];
             designs.push(Design {
                 left_by_itself: left(&[Some(slow), Some(fast)]),
-                ..Design::new(question, place, road, Some(slow), frequencies, &all)
+                ..Design::new(request, place, road, Some(slow), frequencies, &all)
             });
         }
     }
@@ -200,14 +200,14 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Stu
         .filter(|&i| length(&designs[i]) <= LONGEST_S)
         .min_by(|&a, &b| length(&designs[a]).total_cmp(&length(&designs[b])));
     let confirmation = match best {
-        Some(best) if question.confirmations > 0 => {
-            Some(confirm(question, place, &designs[best], &drivers, &done)?)
+        Some(best) if request.confirmations > 0 => {
+            Some(confirm(request, place, &designs[best], &drivers, &done)?)
         }
         _ => None,
     };
-    Ok(Answer {
-        parameter: question.parameter.clone(),
-        error: question.error,
+    Ok(DesignResult {
+        parameter: request.parameter.clone(),
+        error: request.error,
         designs,
         best,
         confirmation,
@@ -215,8 +215,8 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Stu
 }
 
 /// Drives that `design` will call back for.
-pub fn drives(question: &Question) -> u64 {
-    let each = question.courses.len() * probes(question).len() * question.participants.len();
+pub fn drives(request: &DesignRequest) -> u64 {
+    let each = request.courses.len() * probes(request).len() * request.participants.len();
     each as u64
 }
 
@@ -226,10 +226,10 @@ fn drivers(numbers: &[u32]) -> Result<Vec<(u32, PublishedDriver)>, StudyError> {
 }
 
 /// No probe, and all that the controller accepts.
-fn probes(question: &Question) -> Vec<Option<Probe>> {
+fn probes(request: &DesignRequest) -> Vec<Option<Probe>> {
     let mut out = vec![None];
-    for &amplitude_nm in &question.amplitudes_nm {
-        for &frequency_hz in &question.frequencies_hz {
+    for &amplitude_nm in &request.amplitudes_nm {
+        for &frequency_hz in &request.frequencies_hz {
             let probe = Probe {
                 amplitude_nm,
                 frequency_hz,
@@ -244,7 +244,7 @@ fn probes(question: &Question) -> Vec<Option<Probe>> {
 
 impl Design {
     fn new(
-        question: &Question,
+        request: &DesignRequest,
         place: usize,
         course: &Course,
         probe: Option<Probe>,
@@ -253,7 +253,7 @@ impl Design {
     ) -> Self {
         let errors: Vec<[f64; 6]> = all
             .iter()
-            .map(|i| i.standard_errors(question.t_nms_known))
+            .map(|i| i.standard_errors(request.t_nms_known))
             .collect();
         let rms = |i: usize| (errors.iter().map(|e| e[i] * e[i]).sum::<f64>() / errors.len() as f64).sqrt();
         let span_s = all.iter().map(|i| i.span_s).sum::<f64>() / all.len() as f64;
@@ -263,7 +263,7 @@ impl Design {
             frequencies_hz,
             span_s,
             standard_errors: std::array::from_fn(rms),
-            needed_s: needed(question, place, all),
+            needed_s: needed(request, place, all),
             left_by_itself: 0,
         }
     }
@@ -285,21 +285,21 @@ impl Design {
 
 /// The length at which the root mean square of the errors is the one asked for, by bisection: what is known of t_nms
 /// beforehand does not grow with the drive.
-fn needed(question: &Question, place: usize, all: &[Information]) -> Option<f64> {
+fn needed(request: &DesignRequest, place: usize, all: &[Information]) -> Option<f64> {
     let error = |span_s: f64| {
         let squares = all.iter().map(|i| {
             let lasting = i.lasting(span_s);
-            lasting.standard_errors(question.t_nms_known)[place].powi(2)
+            lasting.standard_errors(request.t_nms_known)[place].powi(2)
         });
         (squares.sum::<f64>() / all.len() as f64).sqrt()
     };
     let (mut low, mut high) = (1.0, 1e6);
-    if error(high).is_nan() || error(high) > question.error {
+    if error(high).is_nan() || error(high) > request.error {
         return None;
     }
     for _ in 0..60 {
         let middle = f64::sqrt(low * high);
-        if error(middle) > question.error {
+        if error(middle) > request.error {
             low = middle;
         } else {
             high = middle;
@@ -310,23 +310,21 @@ fn needed(question: &Question, place: usize, all: &[Information]) -> Option<f64>
 
 /// Drives the design and identifies.
 fn confirm(
-    question: &Question,
+    request: &DesignRequest,
     place: usize,
     design: &Design,
     drivers: &[(u32, PublishedDriver)],
     done: &(impl Fn() + Sync),
 ) -> Result<Confirmation, StudyError> {
-    let course = question.courses.iter().find(|c| c.name() == design.course);
+    let course = request.courses.iter().find(|c| c.name() == design.course);
     let length_s = design.needed_s.unwrap_or(design.span_s).max(SHORTEST_S);
     let probes = design.probes();
     let jobs: Vec<(u32, PublishedDriver, u64)> = drivers
         .iter()
-        .flat_map(|&(number, driver)| {
-            (0..u64::from(question.confirmations)).map(move |r| (number, driver, r))
-        })
+        .flat_map(|&(number, driver)| (0..u64::from(request.confirmations)).map(move |r| (number, driver, r)))
         .collect();
     let options = Options {
-        t_nms_known: question.t_nms_known,
+        t_nms_known: request.t_nms_known,
         ..Options::default()
     };
     let found = jobs
@@ -340,7 +338,7 @@ fn confirm(
                 let mut turn = 0;
                 while left_s > 0.0 && turn < 100 {
                     let seed = 1_000_000
-                        + question.seed.wrapping_mul(10_000)
+                        + request.seed.wrapping_mul(10_000)
                         + u64::from(number) * 101
                         + repetition * 7919
                         + (half as u64) * 131
@@ -368,7 +366,7 @@ fn confirm(
                 truth.k_hg,
                 truth.t_p_s,
             ][place];
-            let promised = predicted.map_or(f64::NAN, |p| p.standard_errors(question.t_nms_known)[place]);
+            let promised = predicted.map_or(f64::NAN, |p| p.standard_errors(request.t_nms_known)[place]);
             let off = p.optimum.map_or(f64::NAN, |x| x - truth);
             let held = p
                 .interval_95

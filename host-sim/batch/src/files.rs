@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use haptic_sim::input::InputError;
+use haptic_sim::input::{InputError, in_range};
 use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::scenario::Scenario;
 
@@ -49,12 +49,64 @@ pub fn load_lane(path: &Path, lane: &LaneChoice) -> Result<Course, InputError> {
 }
 
 /// Names the file and what the system says of it.
-fn read(path: &Path) -> Result<String, InputError> {
+pub(crate) fn read(path: &Path) -> Result<String, InputError> {
     std::fs::read_to_string(path).map_err(|e| InputError::new(path.display(), e))
 }
 
+/// Where the file of a study is, for its errors and its courses.
+pub(crate) struct Source<'a> {
+    pub(crate) name: String,
+    pub(crate) folder: &'a Path,
+}
+
+impl<'a> Source<'a> {
+    pub(crate) fn new(name: impl Into<String>, folder: &'a Path) -> Self {
+        let name = name.into();
+        Self { name, folder }
+    }
+
+    /// A file, and its text.
+    pub(crate) fn open(path: &'a Path) -> Result<(Self, String), InputError> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Ok((Self::new(path.display().to_string(), folder), read(path)?))
+    }
+
+    /// The course of a name in the file. Its errors name the path; the course has the name, since it is no matter where the program
+    /// was called from.
+    pub(crate) fn course(&self, name: &str, lane: &LaneChoice) -> Result<Course, InputError> {
+        let path = self.folder.join(name);
+        let bytes = std::fs::read(&path).map_err(|e| InputError::new(path.display(), e))?;
+        Course::from_text(name, &String::from_utf8_lossy(&bytes), lane)
+    }
+
+    pub(crate) fn bad(&self, message: impl std::fmt::Display) -> InputError {
+        InputError::new(&self.name, message)
+    }
+
+    pub(crate) fn within(
+        &self,
+        field: &str,
+        value: f64,
+        low: f64,
+        high: f64,
+        unit: &'static str,
+    ) -> Result<(), InputError> {
+        in_range(field, value, low..=high, unit).map_err(|e| self.bad(e))
+    }
+
+    pub(crate) fn count(&self, field: &str, value: u64, low: f64, high: f64) -> Result<u32, InputError> {
+        self.within(field, value as f64, low, high, "")?;
+        Ok(value as u32)
+    }
+}
+
+/// The default of a seed and of what is done once.
+pub(crate) fn one() -> u64 {
+    1
+}
+
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use haptic_sim::scenario::Condition;
 
@@ -73,6 +125,20 @@ mod tests {
         assert!(relying.course().name().ends_with("hill-road.toml"));
         let braking = load_scenario(&folder.join("braking-into-a-curve.toml")).unwrap();
         assert!(braking.changes_speed() && braking.speed_kmh() == 100.0);
+    }
+
+    /// `file` with each text replaced is refused, in words that hold the last of the three.
+    pub(crate) fn check_refusals(
+        file: &str,
+        wrong: &[(&str, &str, &str)],
+        read: impl Fn(&str) -> Option<InputError>,
+    ) {
+        for (from, to, says) in wrong {
+            let text = file.replacen(from, to, 1);
+            assert_ne!(text, file, "{from}");
+            let error = read(&text).expect(to).to_string();
+            assert!(error.contains(says), "{to}: {error}");
+        }
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub(crate) enum Cell {
 }
 
 /// A column's values on their way.
-pub(crate) enum Column {
+pub(crate) enum ParquetColumn {
     Whole(Vec<i64>),
     Number(Vec<Option<f64>>),
     Text(Vec<String>),
@@ -33,18 +33,18 @@ pub(crate) enum Column {
 /// A table on its way.
 pub(crate) struct Table {
     writer: SerializedFileWriter<BufWriter<File>>,
-    columns: Vec<Column>,
+    columns: Vec<ParquetColumn>,
     rows: usize,
 }
 
 impl Table {
     /// With its columns, empty, and with what the file's metadata say.
     pub(crate) fn create(
-        columns: impl IntoIterator<Item = (String, Column)>,
+        columns: impl IntoIterator<Item = (String, ParquetColumn)>,
         metadata: &[(&str, &str)],
         file: File,
     ) -> io::Result<Self> {
-        let (names, columns): (Vec<String>, Vec<Column>) = columns.into_iter().unzip();
+        let (names, columns): (Vec<String>, Vec<ParquetColumn>) = columns.into_iter().unzip();
         let fields = names
             .iter()
             .zip(&columns)
@@ -101,7 +101,7 @@ impl Table {
     }
 }
 
-impl Column {
+impl ParquetColumn {
     fn field(&self, name: &str) -> io::Result<Arc<Type>> {
         let (kind, repetition) = match self {
             Self::Whole(_) => (Kind::INT64, Repetition::REQUIRED),

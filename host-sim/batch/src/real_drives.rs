@@ -123,7 +123,7 @@ pub fn real_drives(directory: &Path) -> Result<RealDrives, StudyError> {
             directory.display()
         ));
     }
-    let found: Vec<Judged<'_>> = files
+    let found: Vec<FileResult<'_>> = files
         .par_iter()
         .map(|path| of_file(directory, path, &layouts))
         .collect();
@@ -142,13 +142,13 @@ pub fn real_drives(directory: &Path) -> Result<RealDrives, StudyError> {
     let felt: Vec<&(Felt, Vec<Fed>)> = found.iter().filter_map(|file| file.hands.as_ref()).collect();
     Ok(RealDrives {
         sources,
-        hands: Hands::of(&felt),
+        hands: Hands::new(&felt),
         drives: found.into_iter().flat_map(|file| file.drives).collect(),
     })
 }
 
 /// What a file showed.
-struct Judged<'a> {
+struct FileResult<'a> {
     layout: Option<&'a Layout>,
     drives: Vec<RealDrive>,
     hands: Option<(Felt, Vec<Fed>)>,
@@ -159,15 +159,15 @@ fn collect(directory: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
         let path = entry?.path();
         if path.is_dir() {
             collect(&path, files)?;
-        } else if Format::of(&path).is_ok_and(|format| !format.holds_frames()) {
+        } else if Format::from_path(&path).is_ok_and(|format| !format.holds_frames()) {
             files.push(path);
         }
     }
     Ok(())
 }
 
-fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'a> {
-    let refused = |drive| Judged {
+fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> FileResult<'a> {
+    let refused = |drive| FileResult {
         layout: None,
         drives: vec![drive],
         hands: None,
@@ -188,7 +188,7 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
         Ok(bytes) => bytes,
         Err(error) => return refused(drive("", true, Err(error.to_string().into()))),
     };
-    let format = Format::of(path).ok();
+    let format = Format::from_path(path).ok();
     let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format)) else {
         // A file that is broken says where; of a whole one only the time is missed.
         let why = match formats::read_bytes(bytes, format.unwrap_or(Format::Csv), None) {
@@ -197,10 +197,10 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
         };
         return refused(drive("", true, Err(why.into())));
     };
-    let rows = Rows::of(layout, &bytes, format);
+    let rows = Rows::read(layout, &bytes, format);
     let hands = rows.map(|rows| {
         (
-            Felt::of(&rows),
+            Felt::new(&rows),
             Feed::ALL.map(|feed| fed(&rows, feed, &file)).into(),
         )
     });
@@ -222,7 +222,7 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
     // What is wrong with the file as a whole is said once.
     let same = hand.refused.is_some() && hand.refused == shared.refused;
     let drives = parts.into_iter().take(if same { 1 } else { 2 }).collect();
-    Judged {
+    FileResult {
         layout: Some(layout),
         drives,
         hands,

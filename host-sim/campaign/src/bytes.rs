@@ -138,7 +138,7 @@ pub(super) struct Status {
 }
 
 impl Status {
-    pub(super) fn of(frame: &Frame) -> Self {
+    pub(super) fn decode(frame: &Frame) -> Self {
         Self {
             counter: unsigned(frame, 8, 4) as u8,
             torque_nm: signed(frame, 12, 16) as f64 / 4096.0,

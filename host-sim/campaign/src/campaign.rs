@@ -29,7 +29,7 @@ pub struct Campaign {
 }
 
 impl Campaign {
-    pub(super) fn of(rows: Vec<CaseResult>) -> Self {
+    pub(super) fn new(rows: Vec<CaseResult>) -> Self {
         Self {
             runs: rows.iter().map(|row| row.runs).sum(),
             cycles: rows.iter().map(|row| row.cycles).sum(),
@@ -170,7 +170,7 @@ pub fn run(
         drivers: world.drivers(),
         limits: world.drivers().limits(),
         first_seed: seeds.start,
-        ..Campaign::of(rows)
+        ..Campaign::new(rows)
     }
 }
 

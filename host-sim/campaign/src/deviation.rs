@@ -23,7 +23,7 @@ pub struct Deviation {
     pub faulted_m: f64,
     /// The same had the torque been dropped in the step in which the ECU left; `None` if it stayed.
     pub dropped_m: Option<f64>,
-    /// Largest distance from the vehicle whose torque is cut at the onset: what the torque moves it after that. Of class C alone.
+    /// Largest distance from the vehicle whose torque is cut at the onset, m: the effect of the torque after the onset. For class C only.
     pub pushed_m: Option<f64>,
     /// Whether the vehicle left its lane where the fault-free one did not.
     pub leaves_lane: bool,

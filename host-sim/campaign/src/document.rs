@@ -1,6 +1,6 @@
 //! The table of faults in words, as `host-sim faults --list` prints it and `docs/reference/fault-campaign.md` holds it.
 
-use super::residual::Seen;
+use super::residual::Detectability;
 use super::table::{Expect, FaultCase, GROUPS};
 
 /// All rows as Markdown tables, one for each group.
@@ -36,7 +36,7 @@ fn reaction(row: &FaultCase) -> String {
         Expect::GoesOn { rejects: true } => "goes on, rejects".into(),
         Expect::GoesOn { rejects: false } => "goes on".into(),
         Expect::Uncut => "goes on, not cut".into(),
-        Expect::MayHandOver if row.seen == Seen::AtOnce => "goes on, or hands over".into(),
+        Expect::MayHandOver if row.seen == Detectability::AtOnce => "goes on, or hands over".into(),
         Expect::MayHandOver => "goes on, or hands over once it looks impossible".into(),
         Expect::OnlyRules => "whatever the rules of every cycle allow".into(),
         Expect::HandsOverOrStops => within("hands over, or zero and latched,"),

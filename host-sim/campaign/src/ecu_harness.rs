@@ -15,7 +15,7 @@ use super::bytes::Status;
 use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LANE_STEP};
 use super::injection::{Clock, Injection, Inside};
 use super::invariants::InvariantChecker;
-use super::residual::{Residual, Seen};
+use super::residual::{Detectability, Residual};
 use super::senders::{Senders, SensorReadings};
 use super::start_up::{is_engaged, start_up};
 use super::table::{Class, FaultCase};
@@ -281,17 +281,17 @@ impl<'a> EcuHarness<'a> {
         let used = self.residual.used(self.row.seen);
         if self.record.modes.last().is_some_and(|(_, mode)| *mode == ACTIVE) {
             let still = self.residual.still_used(self.senders.has_probe());
-            let shown = if self.row.seen == Seen::Contradiction {
+            let shown = if self.row.seen == Detectability::Contradiction {
                 used.max(still)
             } else {
                 used
             };
             self.record.used = self.record.used.max(shown);
-            let contradicted = self.residual.used(Seen::Contradiction).max(still);
+            let contradicted = self.residual.used(Detectability::Contradiction).max(still);
             self.record.contradicted = self.record.contradicted.max(contradicted);
         }
-        let since = |by| self.residual.seen_since(by, observation.step);
-        let (since, weak_since) = (since(self.row.seen), since(Seen::MotorWeak));
+        let since = |by| self.residual.detectable_since(by, observation.step);
+        let (since, weak_since) = (since(self.row.seen), since(Detectability::MotorWeak));
         // A motor that came back within the ECU's patience has not been astray.
         let returned =
             self.row.seen.is_of_motor() && self.record.modes.last().is_some_and(|(_, m)| *m == ACTIVE);
@@ -353,7 +353,7 @@ impl Guidance for EcuHarness<'_> {
             let world_us = u64::from(step) * 1000;
             self.checker
                 .cycle(step, world_us, now_us, &out.guidance, &out.others);
-            let status = Status::of(&out.guidance);
+            let status = Status::decode(&out.guidance);
             self.commanded_nm = status.torque_nm;
             self.record_status(step, &status);
             self.record.ecu.take_frame(step, &out.guidance);

@@ -164,7 +164,7 @@ pub(super) enum Injection {
     Invalid,
     /// A node that knows the ECU's checks: e_y' goes to so many m within so many ms, and e_theta' follows the yaw rate, so
     /// that no movement is predicted. With `hides_hand` the driver torque becomes what the column's model expects.
-    Lie {
+    FalseLane {
         to_m: f64,
         ms: u32,
         hides_hand: bool,

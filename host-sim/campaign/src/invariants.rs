@@ -185,7 +185,7 @@ impl InvariantChecker {
     /// A cycle of the ECU: `step` and `world_us` in the world, `now_us` on the ECU's clock.
     pub(super) fn cycle(&mut self, step: u32, world_us: u64, now_us: u32, frame: &Frame, others: &[Frame]) {
         self.cycles += 1;
-        let status = Status::of(frame);
+        let status = Status::decode(frame);
         let verdict = self.judge(world_us, now_us, frame, &status, others);
         if let (Err(broken), None) = (verdict, &self.violation) {
             let what = broken.to_string();

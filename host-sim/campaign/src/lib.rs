@@ -48,6 +48,6 @@ mod wire;
 pub use deviation::Deviation;
 pub use drivers::OFF_ROAD_M;
 pub use invariants::Violation;
-pub use residual::Seen;
+pub use residual::Detectability;
 pub use speed_change::SpeedChange;
 pub use trial::{TrialOutcome, World};

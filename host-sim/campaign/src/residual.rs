@@ -1,98 +1,105 @@
-//! When a fault can be seen: the plausibility checks a second time, in f64 and from unrounded values.
+//! Decides from when on a fault can be detected: a second implementation of the plausibility checks, in f64 and from
+//! unrounded values.
 //!
-//! A frozen lateral error on a straight is an honest one, so a reaction can only be asked for from the moment
-//! in which what arrives contradicts itself. This file decides that moment without the core: the change of the
-//! near-point error that speed, yaw error and yaw rate predict against the change seen, and the column's
-//! torques against its movement, each through a memory of 1 s. Vehicle and margins are the documented ones
-//! (`docs/explanation/plausibility.md`), from table 9. A sample further away than a vehicle can move is passed over, until the
-//! line that it tells of is taken; when there is nothing else for four seconds, that is seen.
+//! On a straight a frozen lateral error is also the true one. So a reaction can only be required from the moment at
+//! which the inputs contradict each other. This file finds that moment without the core. It compares the change of
+//! the near-point error that speed, yaw error and yaw rate predict with the observed one, and the torques on the
+//! column with its movement, each summed with a time constant of 1 s. Vehicle and margins are those of the documents
+//! (`docs/explanation/plausibility.md`), from table 9. A sample that is further from the last one than a vehicle can
+//! move is ignored, until its line is adopted. If there are only such samples for four seconds, the fault counts as
+//! detected.
 
 use std::collections::VecDeque;
 
-use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::models::vehicle::{SteadyCornering, VehicleParameters};
 
-/// Share of a margin from which on sensors cannot hide it: a wheel angle of 0.1 deg is worth up to 1.2 %.
+/// From this share of a margin on, the resolution of the sensors cannot hide a contradiction: a wheel angle of 0.1
+/// deg makes up to 1.2 %.
 const SURELY_SEEN: f64 = 1.02;
 
-/// A movement that was predicted and did not come, m.
+/// Margin of a movement that was predicted and did not happen, m.
 pub(super) const LANE_MARGIN_M: f64 = 0.4;
-/// A movement that nothing predicts, and that no vehicle makes, m.
+/// Margin of a movement that was not predicted; no vehicle moves further, m.
 pub(super) const UNREAL_M: f64 = 0.8;
-/// Momentum on the column that did not show in the wheel, N.m.s.
+/// Margin of the momentum of the column's torques that the wheel's movement does not show, N.m.s.
 pub(super) const COLUMN_MARGIN_NM_S: f64 = 0.6;
-/// Further than the near-point error can go between two samples, m.
+/// Largest change of the near-point error between two samples, m.
 pub(super) const LANE_STEP_M: f64 = 0.3;
-/// Further than the far-point yaw error can go between two samples, rad.
+/// Largest change of the far-point yaw error between two samples, rad.
 pub(super) const YAW_STEP_RAD: f64 = 0.1;
 /// Ends of the signals' ranges on the bus.
 const LANE_RANGE_M: f64 = 4.0;
 const YAW_RANGE_RAD: f64 = 0.5;
-/// Further than a motor may be from what it was told, N.m, and as a share of it.
+/// Largest error of a motor's torque: a constant part, N.m, and a share of the command.
 pub(super) const MOTOR_MARGIN_NM: f64 = 0.1;
 const MOTOR_ERROR: f64 = 0.125;
-/// For this long a motor may echo an older command, steps; and its lag, steps.
+/// For how many steps a motor may still answer an older command; and its lag in steps.
 const MOTOR_ECHO: usize = 8;
 const MOTOR_LAG: f64 = 64.0 / 3.0;
 /// Slowest speed that is guided, m/s.
 const LEAST_SPEED_M_PER_S: f64 = 5.0;
 const MEMORY_S: f64 = 1.0;
-/// How long a line may be elsewhere; until the old one is let go of, three frames of its sender included; and where it is taken.
+/// How long samples may show a line elsewhere, s; when the old line is given up, with the three frames of a time-out,
+/// s; and how near a new line must be to be adopted.
 const ELSEWHERE_S: f64 = 4.0;
 const LET_GO_S: f64 = 0.55;
 const NEAR_M: f64 = 0.8;
 const NEAR_RAD: f64 = 0.2;
-/// t'_n, and how long before the far point is where the near point is now, s.
+/// t'_n, and the time that the vehicle needs from the near point to the far point, s.
 const NEAR_TIME_S: f64 = 0.3;
 const BETWEEN_S: f64 = 0.4;
-/// What is learnt slowly, and its bounds: m/s of the line, N.m of the column.
+/// Time constant of the slowly learnt errors, s, and their bounds: of the line's prediction, m/s, and of the column's
+/// torques, N.m.
 const LEARNT_WITHIN_S: f64 = 16.0;
 const LANE_BIAS_M_PER_S: f64 = 0.15;
 const COLUMN_BIAS_NM: f64 = 0.5;
-/// Friction, share of the aligning torque that is not known, and all that acts for one of the driver's torque.
+/// Friction, the uncertain share of the aligning torque, and how many times the driver torque driver and power assist
+/// together are at most.
 const FRICTION_NM: f64 = 0.5;
 const ALIGNING_SHARE: f64 = 77.0 / 256.0;
 const ASSIST: f64 = 5.0;
-/// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank.
+/// Wind or bank may make the aligning torques by yaw rate and by wheel angle differ by this much.
 const PUSHED_NM: f64 = 0.3;
-/// A driver torque that is the same for so long while the wheel turns so far, beside the probe and without it: a count begins anew
-/// when it moves, and after two seconds.
+/// A driver torque counts as stuck if it has not changed for this time, s, in which the wheel turned by [`STILL_TURN_RAD`].
 const STILL_S: f64 = 1.0;
+/// The turn of the wheel is measured anew when the torque changes, and after this time, s.
 const STILL_WITHIN_S: f64 = 2.0;
+/// With the probe, and without it, rad.
 const STILL_TURN_RAD: [f64; 2] = [0.0087, 0.14];
 /// Inertia of column and wheel.
 const INERTIA_KG_M2: f64 = 0.125;
 
-/// What between two ends is nearest to zero.
+/// The value of an interval that is nearest to zero.
 fn nearest_to_zero([least, most]: [f64; 2]) -> f64 {
     least.max(0.0) + most.min(0.0)
 }
 
-/// Whether errors are further from the last than a vehicle can go.
+/// Whether lane errors are further from the last ones than a vehicle can move.
 fn is_a_step(last: [f64; 2], new: [f64; 2]) -> bool {
     (new[0] - last[0]).abs() > LANE_STEP_M || (new[1] - last[1]).abs() > YAW_STEP_RAD
 }
 
-/// Whether a line that is elsewhere may be taken: near, and along the road.
+/// Whether another line may be adopted: it is near and runs along the road.
 fn is_near([e_y_m, e_theta_rad]: [f64; 2]) -> bool {
     e_y_m.abs() <= NEAR_M && e_theta_rad.abs() <= NEAR_RAD
 }
 
-/// What a fault can be seen by.
+/// By what a fault can be detected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seen {
-    /// It needs no movement to be seen.
+pub enum Detectability {
+    /// It can be detected at once, without any movement.
     AtOnce,
     /// The lane errors contradict the vehicle's movement, or the driver torque the wheel's.
     Contradiction,
-    /// The motor's torque is further from zero, or further on its other side, than any that it was told lately.
+    /// The motor's torque is further from zero than any recent command, or on the other side of zero.
     MotorAstray,
-    /// The motor's torque is less than what it was told lately.
+    /// The motor's torque is smaller than the recent commands.
     MotorWeak,
     /// A speed below the slowest guided.
     Speed,
 }
 
-impl Seen {
+impl Detectability {
     /// Whether it is the motor's torque that shows it.
     pub(super) fn is_of_motor(self) -> bool {
         matches!(self, Self::MotorAstray | Self::MotorWeak)
@@ -112,9 +119,7 @@ impl Seen {
 /// The checks' sums and last values.
 #[derive(Debug, Clone)]
 pub(super) struct Residual {
-    aligning_gain_nm_s2_per_m: f64,
-    curvature_gain_per_m: f64,
-    stability_factor_s2_per_m2: f64,
+    vehicle: SteadyCornering,
     damping_nm_s: f64,
     speeds_m_per_s: [f64; 2],
     yaw_rate_rad_per_s: f64,
@@ -131,15 +136,15 @@ pub(super) struct Residual {
     moved_m: f64,
     now_s: f64,
     column_at_s: Option<f64>,
-    /// A driver torque, since when it is the same, and the least and largest wheel angle meanwhile.
+    /// The driver torque, the time from which on it has not changed, and the least and largest wheel angle since.
     still: (f64, f64, [f64; 2]),
     momentum_nm_s: f64,
     commands_nm: [f64; MOTOR_ECHO],
-    /// Least and largest torque that an honest motor may deliver.
+    /// Least and largest torque that a working motor may deliver.
     motor_band_nm: [f64; 2],
     motor_nm: f64,
-    /// Steps in a row in which the motor was surely away from what it was told, and in which it surely had a torque that should
-    /// not be there.
+    /// Steps in a row in which the motor certainly deviated from its command, and in which it certainly delivered a
+    /// torque that was not commanded.
     off: u32,
     astray: u32,
 }
@@ -147,22 +152,9 @@ pub(super) struct Residual {
 impl Residual {
     /// At rest, for a vehicle at a speed.
     pub(super) fn new(vehicle: &VehicleParameters, v_m_per_s: f64) -> Self {
-        let VehicleParameters {
-            m,
-            l_f,
-            l_r,
-            k_f,
-            k_r,
-            k_t,
-            b_s,
-            ..
-        } = *vehicle;
-        let l = l_f + l_r;
         Self {
-            aligning_gain_nm_s2_per_m: vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
-            curvature_gain_per_m: k_t / l,
-            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
-            damping_nm_s: b_s,
+            vehicle: vehicle.steady_cornering(),
+            damping_nm_s: vehicle.b_s,
             speeds_m_per_s: [v_m_per_s; 2],
             yaw_rate_rad_per_s: 0.0,
             wheel_rad: 0.0,
@@ -186,12 +178,12 @@ impl Residual {
         }
     }
 
-    /// Another step.
+    /// Begins another step.
     pub(super) fn at(&mut self, time_s: f64) {
         self.now_s = time_s;
     }
 
-    /// Takes the speeds and the yaw rate that arrive. Speeds that contradict each other move nothing.
+    /// Takes the speeds and the yaw rate that arrive. Speeds that contradict each other are ignored.
     pub(super) fn motion(&mut self, time_s: f64, speeds_m_per_s: [f64; 2], yaw_rate_rad_per_s: f64) {
         let apart = speeds_m_per_s[0] - speeds_m_per_s[1];
         if apart.abs() < 2.0 {
@@ -223,12 +215,12 @@ impl Residual {
         if let Some(before_s) = self.column_at_s {
             let dt = time_s - before_s;
             let v = self.speeds_m_per_s[0];
-            let aligning_at = |turning: f64| self.aligning_gain_nm_s2_per_m * v * turning;
+            let aligning_at = |turning: f64| self.vehicle.aligning_gain_nm_s2_per_m * v * turning;
             let aligning = aligning_at(self.yaw_rate_rad_per_s);
-            // As the wheel angle would let the vehicle turn if nothing pushed it.
+            // The aligning torque for the yaw rate that the wheel angle alone would cause.
             let by_wheel = aligning_at(
-                v * self.curvature_gain_per_m * self.wheel_rad
-                    / (1.0 + self.stability_factor_s2_per_m2 * v * v),
+                v * self.vehicle.curvature_gain_per_m * self.wheel_rad
+                    / (1.0 + self.vehicle.stability_factor_s2_per_m2 * v * v),
             );
             let by_wheel = by_wheel.clamp(aligning - PUSHED_NM, aligning + PUSHED_NM);
             self.wheel_rate_rad_per_s = (wheel_rad - self.wheel_rad) / dt;
@@ -237,7 +229,8 @@ impl Residual {
                 moving + driver_nm.min(ASSIST * driver_nm) - aligning.max(by_wheel),
                 moving + driver_nm.max(ASSIST * driver_nm) - aligning.min(by_wheel),
             ];
-            // The torque that is missing at least, and how much of it friction and aligning torque may hide either way.
+            // The least imbalance of the torques, and how much of it friction and the uncertain aligning torque may
+            // explain.
             let bias = self.column_bias_nm;
             let missing = nearest_to_zero(ends) - bias;
             let tolerance = FRICTION_NM + ALIGNING_SHARE * aligning.abs();
@@ -260,7 +253,7 @@ impl Residual {
             if time_s - before_s < LET_GO_S || !is_near([e_y_m, e_theta_rad]) {
                 return;
             }
-            // What comes next has no past.
+            // The next sample is compared with nothing.
             self.lines.clear();
             (self.predicted_m, self.moved_m, self.lane) = (0.0, 0.0, None);
         }
@@ -293,7 +286,7 @@ impl Residual {
         Some(v * (direction - self.heading(at_s)) - v * NEAR_TIME_S * self.yaw_rate_rad_per_s)
     }
 
-    /// Takes what the motor was told and what it gave.
+    /// Takes the command to the motor and the torque that it delivered.
     pub(super) fn motor(&mut self, commanded_nm: f64, delivered_nm: f64) {
         self.commands_nm.rotate_right(1);
         let oldest = std::mem::replace(&mut self.commands_nm[0], commanded_nm);
@@ -302,20 +295,20 @@ impl Residual {
         *high = (*high + (commanded_nm.max(oldest) - *high) / MOTOR_LAG).max(commanded_nm.max(oldest));
         self.motor_nm = delivered_nm;
         let count = |so_far: u32, used: f64| if used >= SURELY_SEEN { so_far + 1 } else { 0 };
-        self.off = count(self.off, self.used(Seen::MotorWeak));
-        self.astray = count(self.astray, self.used(Seen::MotorAstray));
+        self.off = count(self.off, self.used(Detectability::MotorWeak));
+        self.astray = count(self.astray, self.used(Detectability::MotorAstray));
     }
 
-    /// Since which step the fault can be seen, if it can be in this one.
-    pub(super) fn seen_since(&self, by: Seen, step: u32) -> Option<u32> {
+    /// The step from which on the fault can be detected, if it can be in this one.
+    pub(super) fn detectable_since(&self, by: Detectability, step: u32) -> Option<u32> {
         match by {
-            Seen::MotorWeak => (self.off > 0).then(|| step + 1 - self.off),
-            Seen::MotorAstray => (self.astray > 0).then(|| step + 1 - self.astray),
+            Detectability::MotorWeak => (self.off > 0).then(|| step + 1 - self.off),
+            Detectability::MotorAstray => (self.astray > 0).then(|| step + 1 - self.astray),
             _ => (self.used(by) >= SURELY_SEEN).then_some(step),
         }
     }
 
-    /// Share of the lane's margin that is used: 1 and more can be seen.
+    /// Used share of the lane's margin: from 1 on a fault can be detected.
     pub(super) fn lane_used(&self) -> f64 {
         // No possible sample for as long as guidance goes on without.
         let silence_s = self.lane.map_or(0.0, |(at_s, ..)| self.now_s - at_s);
@@ -323,7 +316,7 @@ impl Residual {
             return f64::INFINITY;
         }
         let missing = (self.predicted_m - self.moved_m) * self.predicted_m.signum();
-        // Half the margin has to be predicted: a small movement that nothing predicts proves nothing.
+        // A missing movement counts only if at least half the margin was predicted.
         let slow = (missing / LANE_MARGIN_M).min(self.predicted_m.abs() / (0.5 * LANE_MARGIN_M));
         slow.max(missing.abs() / UNREAL_M)
     }
@@ -335,7 +328,7 @@ impl Residual {
         self.momentum_nm_s.abs() / (COLUMN_MARGIN_NM_S + turning.max(0.0))
     }
 
-    /// Share of the turn that shows a driver torque to be stuck. It excuses a reaction and asks for none.
+    /// Used share of the turn from which on a driver torque counts as stuck. A reaction is allowed then, and not required.
     pub(super) fn still_used(&self, is_probed: bool) -> f64 {
         let (_, since_s, [least, most]) = self.still;
         let allowed = STILL_TURN_RAD[usize::from(!is_probed)];
@@ -355,18 +348,20 @@ impl Residual {
         )
     }
 
-    /// Share of a margin that is used; at 1 a fault can be seen.
-    pub(super) fn used(&self, by: Seen) -> f64 {
+    /// Used share of a margin; at 1 a fault can be detected.
+    pub(super) fn used(&self, by: Detectability) -> f64 {
         match by {
-            Seen::AtOnce => f64::INFINITY,
-            Seen::Contradiction => self.lane_used().max(self.column_used()),
-            Seen::MotorWeak => self.beyond(self.motor_band_nm),
-            // Toward zero a torque is missing; what is there is astray beyond zero only.
-            Seen::MotorAstray => {
+            Detectability::AtOnce => f64::INFINITY,
+            Detectability::Contradiction => self.lane_used().max(self.column_used()),
+            Detectability::MotorWeak => self.beyond(self.motor_band_nm),
+            // A torque that is too small is weak; it is astray only beyond zero, or above the band.
+            Detectability::MotorAstray => {
                 let [low, high] = self.motor_band_nm;
                 self.beyond([low.min(0.0), high.max(0.0)])
             }
-            Seen::Speed => LEAST_SPEED_M_PER_S / self.speeds_m_per_s[0].min(self.speeds_m_per_s[1]).max(1e-9),
+            Detectability::Speed => {
+                LEAST_SPEED_M_PER_S / self.speeds_m_per_s[0].min(self.speeds_m_per_s[1]).max(1e-9)
+            }
         }
     }
 }
@@ -394,7 +389,8 @@ mod tests {
                 for _ in 0..1000 {
                     residual.motor(sign, sign * delivered_nm);
                 }
-                let seen = [Seen::MotorWeak, Seen::MotorAstray].map(|by| residual.used(by) > 1.0);
+                let seen =
+                    [Detectability::MotorWeak, Detectability::MotorAstray].map(|by| residual.used(by) > 1.0);
                 assert_eq!(seen, [weak, astray], "{delivered_nm} {sign}");
             }
         }

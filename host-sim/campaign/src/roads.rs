@@ -28,7 +28,7 @@ fn lengths_s(place: PlaceOnRoad) -> [f64; 2] {
 
 /// A road for a run of so many ms: the lengths of its pieces, the curvature of its arc, and how far the vehicle goes from an
 /// instant on within a time, m.
-struct Plan<'a> {
+struct CurvePlan<'a> {
     lengths_s: [f64; 2],
     curvature_1pm: f64,
     run_ms: u32,
@@ -36,7 +36,7 @@ struct Plan<'a> {
     way_m: &'a dyn Fn(f64, f64) -> f64,
 }
 
-impl Plan<'_> {
+impl CurvePlan<'_> {
     /// A straight of so long, a clothoid of 1 s, an arc, and if the arc ends a clothoid and a straight; on to the end of a
     /// run.
     fn course(&self) -> Course {
@@ -86,7 +86,7 @@ fn at_one_speed(
 ) -> [Course; 2] {
     let v = kmh / 3.6;
     [1.0, -1.0].map(|side| {
-        Plan {
+        CurvePlan {
             lengths_s,
             curvature_1pm: side * lateral_m_per_s2 / (v * v),
             run_ms,
@@ -145,7 +145,7 @@ impl ChangingRoad {
             let at = |time_s: f64| self.change.way_m(time_s - onset_s);
             at(from_s + lasts_s) - at(from_s)
         };
-        Plan {
+        CurvePlan {
             lengths_s,
             curvature_1pm,
             run_ms: onset_ms + self.after_ms,

@@ -123,22 +123,22 @@ impl Senders {
             speeds_m_per_s,
             yaw_rate_rad_per_s,
         };
-        self.lie(honest, observation, injections, since_s)
+        self.falsify(honest, observation, injections, since_s)
     }
 
     /// What a node that knows the checks makes of the readings, if there is one.
-    fn lie(
+    fn falsify(
         &mut self,
         honest: SensorReadings,
         observation: &Observation,
         injections: &[Injection],
         since_s: Option<f64>,
     ) -> SensorReadings {
-        let lie = injections.iter().find_map(|injection| match injection {
-            Injection::Lie { to_m, ms, hides_hand } => Some((*to_m, *ms, *hides_hand)),
+        let false_lane = injections.iter().find_map(|injection| match injection {
+            Injection::FalseLane { to_m, ms, hides_hand } => Some((*to_m, *ms, *hides_hand)),
             _ => None,
         });
-        let (Some((to_m, ms, hides_hand)), Some(since_s)) = (lie, since_s) else {
+        let (Some((to_m, ms, hides_hand)), Some(since_s)) = (false_lane, since_s) else {
             return honest;
         };
         let yaw_rate = observation.yaw_rate_rad_per_s.unwrap_or(0.0);

@@ -11,12 +11,19 @@
 
 use std::fmt;
 
-use haptic_sim::models::real::WorldParameters;
+use haptic_sim::models::nonlinear::WorldParameters;
 use serde::Serialize;
 
 use super::bytes::{FAULT, HANDOVER};
 use super::injection::{Hand, Injection, Motor, Start};
-use super::residual::Seen;
+use super::residual::Detectability;
+
+/// Rows, one line each: name, what is injected, the injections, and what is other than in a row that goes on ([`build`]).
+macro_rules! rows {
+    ($($name:literal $injected:literal $injections:tt $(.$method:ident($($argument:expr),*))*;)*) => {
+        &[$($crate::table::row($name, $injected, &$injections)$(.$method($($argument),*))*),*]
+    };
+}
 
 mod attacks;
 mod build;
@@ -129,7 +136,7 @@ pub struct FaultCase {
     /// Within this time of the instant in which the fault can be seen, ms.
     pub deadline_ms: u32,
     /// What it can be seen by.
-    pub seen: Seen,
+    pub seen: Detectability,
     /// Largest torque from the onset on, N.m.
     pub torque_nm: f64,
     /// Where it is run.
@@ -238,7 +245,7 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
         class: Class::L,
         expect: Expect::GoesOn { rejects: false },
         deadline_ms: 0,
-        seen: Seen::AtOnce,
+        seen: Detectability::AtOnce,
         torque_nm: ORDINARY_NM,
         place: Place::Host,
         injections,

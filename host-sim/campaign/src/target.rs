@@ -80,7 +80,7 @@ pub fn run(
     for target in [in_lockstep, with_memory].into_iter().flatten() {
         target.end()?;
     }
-    Ok(Campaign::of(results))
+    Ok(Campaign::new(results))
 }
 
 fn started(target: &mut Option<Stepped>, memory: bool) -> Result<&mut Stepped, PilError> {
@@ -155,7 +155,7 @@ fn flip(target: &mut Stepped, trace: &EcuTrace, row: &FaultCase, seed: u64) -> R
             Some((guidance, others)) => {
                 flipped.cycles += 1;
                 checker.cycle(tick.step, u64::from(tick.step) * 1000, now_us, guidance, others);
-                let status = Status::of(guidance);
+                let status = Status::decode(guidance);
                 if Some(guidance) != tick.answer.first() {
                     flipped.stopped_after_ms.get_or_insert((k - at) as u32);
                 }

@@ -32,7 +32,7 @@ use haptic_core::controller::params::Params;
 use haptic_log::Event;
 use haptic_sim::Simulation;
 use haptic_sim::models::driver::ArmGains;
-use haptic_sim::models::real::WorldParameters;
+use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::vehicle::VehicleParameters;
@@ -74,8 +74,8 @@ pub struct World {
     roads: Vec<[[Course; 2]; 3]>,
     /// On which the heading passes +-pi.
     turning_road: [Course; 2],
-    /// What is real; nothing if `None`.
-    real: Option<&'static WorldKind>,
+    /// What it has beyond the paper's world; nothing if `None`.
+    kind: Option<&'static WorldKind>,
     driven_by: Drivers,
 }
 
@@ -115,12 +115,12 @@ pub struct TrialOutcome {
 impl World {
     /// Everyone who drives and every road, in the paper's world.
     pub fn new() -> Self {
-        Self::of(None)
+        Self::new_with(None)
     }
 
-    /// The same where roads, cars and cameras are real, and drivers keep the lane in a real car.
-    pub fn real(kind: &'static WorldKind) -> Self {
-        Self::of(Some(kind)).driven_by(Drivers::Population)
+    /// A world beyond the paper's, such as one with friction, wind or braking, with drivers who keep the lane in such a car.
+    pub fn of_kind(kind: &'static WorldKind) -> Self {
+        Self::new_with(Some(kind)).driven_by(Drivers::Population)
     }
 
     /// The same with other drivers.
@@ -136,9 +136,9 @@ impl World {
 
     /// What a command needs beside row and seed to run a trial of this world again.
     pub(crate) fn arguments(&self) -> String {
-        let usual = self.real.map_or(Drivers::Paper, |_| Drivers::Population);
+        let usual = self.kind.map_or(Drivers::Paper, |_| Drivers::Population);
         let world = self
-            .real
+            .kind
             .map_or(String::new(), |kind| format!(" --world {}", kind.name));
         if self.driven_by == usual {
             world
@@ -147,12 +147,12 @@ impl World {
         }
     }
 
-    fn of(real: Option<&'static WorldKind>) -> Self {
-        let surface = real.map_or(Surface::FLAT, WorldKind::surface);
+    fn new_with(kind: Option<&'static WorldKind>) -> Self {
+        let surface = kind.map_or(Surface::FLAT, WorldKind::surface);
         let run_ms = LATEST_ONSET_MS + BEHIND_MS + AFTER_MS;
         let at = |kmh| PLACES.map(|place| roads::curve(kmh, place, run_ms, surface));
         let drivers = everyone();
-        let keeps_lane: Vec<f64> = if real.is_some_and(WorldKind::changes_speed) {
+        let keeps_lane: Vec<f64> = if kind.is_some_and(WorldKind::changes_speed) {
             BETWEEN_KMH.into()
         } else {
             SPEEDS_KMH.into()
@@ -165,14 +165,14 @@ impl World {
             drivers,
             roads: SPEEDS_KMH.map(at).into(),
             turning_road: roads::turning(AFTER_MS, surface),
-            real,
+            kind,
             driven_by: Drivers::Paper,
         }
     }
 
-    /// What is real in it; nothing in the paper's.
+    /// What it has beyond the paper's world; nothing in the paper's own.
     pub fn kind(&self) -> Option<&'static WorldKind> {
-        self.real
+        self.kind
     }
 
     /// Runs a row with a seed.
@@ -195,7 +195,7 @@ impl World {
     /// How the speed of a run changes, if it does in this world. It has a stream of its own: all else is drawn as where it
     /// does not.
     fn draw_change(&self, row: &FaultCase, seed: u64, from_kmh: f64) -> Option<SpeedChange> {
-        self.real.filter(|kind| kind.changes_speed())?;
+        self.kind.filter(|kind| kind.changes_speed())?;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(named(Stream::Faults.seed(seed), "speed"));
         Some(if row.start == Start::HeadingWraps {
             let from_kmh = TURNING_KMH[rng.random_range(0..2)];
@@ -278,7 +278,7 @@ impl World {
             change,
             after_ms: AFTER_MS,
             side: [1.0, -1.0][side],
-            surface: self.real.map_or(Surface::FLAT, WorldKind::surface),
+            surface: self.kind.map_or(Surface::FLAT, WorldKind::surface),
         };
         let (course, onset_ms) = if row.start == Start::HeadingWraps {
             road.turning()
@@ -292,9 +292,9 @@ impl World {
     /// With the car, the road and the sensors of this world, and what a row makes less than ideal.
     fn in_this_world(&self, mut scenario: ScenarioBuilder, row: &FaultCase, seed: u64) -> Scenario {
         let mut plant = self
-            .real
+            .kind
             .map_or_else(WorldParameters::default, WorldKind::parameters);
-        if let Some(kind) = self.real {
+        if let Some(kind) = self.kind {
             scenario = scenario
                 .tolerances(kind.tolerances(seed))
                 .sensor_errors(kind.sensor_errors());
@@ -338,7 +338,7 @@ impl World {
         }
         let reported = record.ecu.events().collect();
         let reported_at = record.ecu.first_fault_from(onset_ms);
-        let verdict = match self.real {
+        let verdict = match self.kind {
             None => judge(row, onset_ms, &record),
             // The second opinion on what can be seen knows the paper's world only: here every rule must hold, and what is
             // noticed is counted.

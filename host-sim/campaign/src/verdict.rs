@@ -2,7 +2,7 @@
 
 use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER, STANDBY};
 use super::invariants::Violation;
-use super::residual::Seen;
+use super::residual::Detectability;
 use super::table::{Expect, FaultCase, WEAK_MS};
 use super::trial_record::TrialRecord;
 
@@ -119,7 +119,7 @@ fn in_time(
 ) -> Result<Option<u32>, Violation> {
     let (seen_at, deadline_ms, mode) = match (record.seen_at, record.weak_at) {
         // A torque the other way that is within a motor's error passes for one that is missing.
-        (None, Some(weak_at)) if row.seen == Seen::MotorAstray => (Some(weak_at), WEAK_MS, HANDOVER),
+        (None, Some(weak_at)) if row.seen == Detectability::MotorAstray => (Some(weak_at), WEAK_MS, HANDOVER),
         (seen_at, _) => (seen_at, row.deadline_ms, mode),
     };
     // What cannot be seen need not be reacted to; the run counts as not seen.
@@ -132,7 +132,7 @@ fn in_time(
     let due = seen_at + deadline_ms;
     match reached {
         // Speeds that fall by themselves contradict the column.
-        Some((step, HANDOVER)) if row.seen == Seen::Speed && record.contradicted >= TOO_EARLY => {
+        Some((step, HANDOVER)) if row.seen == Detectability::Speed && record.contradicted >= TOO_EARLY => {
             Ok(Some(step))
         }
         Some((step, found)) if found != mode => Err(failed(step, format!("mode {found}, not {mode}"))),
@@ -152,7 +152,7 @@ fn in_time(
 
 fn too_early(row: &FaultCase, record: &TrialRecord, reacted_at: Option<u32>) -> Result<(), Violation> {
     match reacted_at {
-        Some(step) if row.seen == Seen::Contradiction && record.used < TOO_EARLY => Err(failed(
+        Some(step) if row.seen == Detectability::Contradiction && record.used < TOO_EARLY => Err(failed(
             step,
             format!("reacted with {:.2} of the margin used", record.used),
         )),

@@ -63,7 +63,7 @@ pub struct Channel {
 /// A quantity or a flag, as a number.
 trait Value: Copy {
     fn number(self) -> f64;
-    fn of(number: f64) -> Self;
+    fn from_number(number: f64) -> Self;
 }
 
 impl Value for f64 {
@@ -71,7 +71,7 @@ impl Value for f64 {
         self
     }
 
-    fn of(number: f64) -> Self {
+    fn from_number(number: f64) -> Self {
         number
     }
 }
@@ -81,7 +81,7 @@ impl Value for bool {
         f64::from(self)
     }
 
-    fn of(number: f64) -> Self {
+    fn from_number(number: f64) -> Self {
         number != 0.0
     }
 }
@@ -104,7 +104,7 @@ macro_rules! channels {
                 source: Source::$source,
                 meaning: concat!($($meaning),+),
                 value: |sample| sample.$field.number(),
-                set: |sample, number| sample.$field = Value::of(number),
+                set: |sample, number| sample.$field = Value::from_number(number),
             },)*
         ];
     };

@@ -72,7 +72,7 @@ fn written(extension: &str) -> Vec<u8> {
 }
 
 fn read(bytes: Vec<u8>, extension: &str) -> Result<Contents, String> {
-    let format = Format::of(Path::new(&format!("x.{extension}"))).unwrap();
+    let format = Format::from_path(Path::new(&format!("x.{extension}"))).unwrap();
     formats::read_bytes(bytes, format, None).map_err(|e| e.to_string())
 }
 

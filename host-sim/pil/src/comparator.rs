@@ -1,4 +1,4 @@
-//! Reads the target's answers and compares them with what the host's controller said.
+//! Reads the frames that the target answers and compares them with those of the host's controller.
 
 use std::fmt;
 use std::sync::mpsc::{Receiver, SyncSender};
@@ -89,26 +89,26 @@ impl fmt::Display for Decoded {
     }
 }
 
-/// What the target spent on the ticks of a run, all frames received, the step and the background: instructions in QEMU,
-/// cycles of the core on a board.
+/// What the ticks of a run cost the target: all frames received, the step and the background. The unit is
+/// instructions in QEMU, and cycles of the core on a board.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Spent {
-    /// The most of any tick.
+    /// The largest cost of a tick.
     pub worst: u32,
     /// Number of that tick, from 0.
     pub worst_step: u64,
-    /// The mean.
+    /// The mean cost of a tick.
     pub mean: f64,
-    /// The most of any background alone: what the controller does after its frames have left.
+    /// The largest cost of a background alone, which is the work after the frames have left.
     pub worst_background: u32,
-    /// Its mean.
+    /// The mean cost of a background.
     pub mean_background: f64,
 }
 
-/// What the target's counter of cycles tells.
+/// What the target's counter of cycles counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Counter {
-    /// Nothing: QEMU, and its clock is this computer's.
+    /// Nothing usable: QEMU runs by this computer's clock.
     Nothing,
     /// QEMU's instructions.
     Instructions,
@@ -141,7 +141,8 @@ impl Comparator {
         }
     }
 
-    /// Compares until nothing more is expected, drops `answering`, and waits for the machine to end.
+    /// Compares until no more answers are expected, drops `answering`, which ends the sender, and waits for the
+    /// machine to end.
     pub(super) fn run(
         mut self,
         expected: &Receiver<Expected>,
@@ -170,7 +171,7 @@ impl Comparator {
         Ok(self.report)
     }
 
-    /// Compares one answer. Returns what the step with its background cost, and the background alone.
+    /// Compares one answer. Returns the cost of the step with its background, and of the background alone.
     fn step(&mut self, expected: &Expected) -> Result<[u32; 2], PilError> {
         let mut host = expected.answer.iter().flatten().copied();
         let cost = loop {
@@ -204,7 +205,7 @@ impl Comparator {
         }
     }
 
-    /// What a step with its background cost, and the background alone.
+    /// Adds a cost to the report. Returns the cost of the step with its background, and of the background alone.
     fn account(&mut self, cost: StepCost) -> [u32; 2] {
         let cycles = [cost.cycles, cost.background_cycles];
         let (spent, most) = match self.counter {

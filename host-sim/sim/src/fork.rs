@@ -21,7 +21,7 @@ pub fn simulate_forked(scenario: &Scenario, failures: &[Failure]) -> Result<(Run
         kind: FailureKind::None,
         ..scenario.failure()
     })?;
-    Ok(match AnyGuidance::of(&trunk) {
+    Ok(match AnyGuidance::new(&trunk) {
         AnyGuidance::None(guidance) => forked(Simulation::with(&trunk, guidance), failures),
         AnyGuidance::Direct(guidance) => forked(Simulation::with(&trunk, *guidance), failures),
         AnyGuidance::OverBus(guidance) => forked(Simulation::with(&trunk, *guidance), failures),

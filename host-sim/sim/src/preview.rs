@@ -38,7 +38,7 @@ impl PreviewPoints {
 
     /// The errors, and the arc lengths of both points, m; `None` where there is no road to look at.
     #[inline]
-    pub(crate) fn look(
+    pub(crate) fn see(
         &mut self,
         road: &Centreline,
         from: &impl DriverVehicle,

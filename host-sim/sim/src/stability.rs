@@ -10,6 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::plant::{ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use crate::models::vehicle::VehicleParameters;
 use haptic_core::controller::params::Params;
 
@@ -22,12 +23,7 @@ pub struct Guided<'a> {
     pub t_n: f64,
 }
 
-const BETA: usize = 0;
-const YAW_RATE: usize = 1;
-const WHEEL: usize = 2;
-const WHEEL_RATE: usize = 3;
-const ARM: usize = 4;
-const YAW: usize = 5;
+// Behind the states of the plant.
 const OFFSET: usize = 6;
 const INTEGRAL: usize = 7;
 /// Three states of the delay.
@@ -65,28 +61,16 @@ pub fn growth_per_s(
     guided: Option<Guided<'_>>,
 ) -> f64 {
     let v = v_m_per_s;
-    let VehicleParameters {
-        m,
-        i,
-        l_f,
-        l_r,
-        k_f,
-        k_r,
-        b_s,
-        j_s,
-        k_t,
-        ..
-    } = *vehicle;
     let mut a = DMatrix::<f64>::zeros(STATES, STATES);
     let mut row = |index: usize, sum: Sum| a.set_row(index, &sum.transpose());
     let [beta, r, phi, rate, arm, y] = [BETA, YAW_RATE, WHEEL, WHEEL_RATE, ARM, OFFSET].map(state);
     let direction = state(YAW) + &beta;
     let k_aln = vehicle.aligning_stiffness();
-    let front_slip = k_t * &phi - &beta - l_f / v * &r;
-    let rear_slip = l_r / v * &r - &beta;
-    let (front, rear) = (2.0 * k_f * &front_slip, 2.0 * k_r * rear_slip);
-    row(BETA, (&front + &rear) / (m * v) - &r);
-    row(YAW_RATE, (l_f * &front - l_r * &rear) / i);
+    let front_slip = vehicle.k_t * &phi - &beta - vehicle.l_f / v * &r;
+    let rear_slip = vehicle.l_r / v * &r - &beta;
+    let (front, rear) = (2.0 * vehicle.k_f * &front_slip, 2.0 * vehicle.k_r * rear_slip);
+    row(BETA, (&front + &rear) / (vehicle.m * v) - &r);
+    row(YAW_RATE, (vehicle.l_f * &front - vehicle.l_r * &rear) / vehicle.i);
     row(WHEEL, rate.clone());
     row(YAW, r.clone());
     row(OFFSET, v * &direction);
@@ -120,7 +104,7 @@ pub fn growth_per_s(
     }
     row(
         WHEEL_RATE,
-        (&arm + &torque - k_aln * &front_slip - b_s * &rate) / j_s,
+        (&arm + &torque - k_aln * &front_slip - vehicle.b_s * &rate) / vehicle.j_s,
     );
     let asked = gains.k_d * &target + driver.k_nms * (&target - &phi) - gains.k_hg * &torque;
     row(ARM, (asked - &arm) / driver.t_nms);

@@ -73,7 +73,7 @@ impl Cause {
     }
 
     /// Of an ECU that has left Active.
-    fn of(status: &Status, around: Circumstances) -> Self {
+    fn new(status: &Status, around: Circumstances) -> Self {
         let of_class = |class: FaultSet| match status.faults.common(class) {
             FaultSet::NONE => Self::Unnamed,
             faults => Self::Faults(faults.bits()),
@@ -162,7 +162,7 @@ impl Watch {
             self.cause = Some(if is_active {
                 Cause::TorqueLost
             } else {
-                Cause::of(status, around)
+                Cause::new(status, around)
             });
         }
     }

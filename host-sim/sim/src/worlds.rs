@@ -3,7 +3,7 @@
 //! A world is a kind: each drive in it meets another car, another wind and another road.
 
 use crate::models::disturbances::SensorErrors;
-use crate::models::real::{Tyres, WorldParameters};
+use crate::models::nonlinear::{Tyres, WorldParameters};
 use crate::models::tolerances::Tolerances;
 
 /// How a road lies across.
@@ -43,7 +43,7 @@ impl Surface {
 pub struct WorldKind {
     /// By which it is asked for.
     pub name: &'static str,
-    /// What is real in it, in words.
+    /// What it has beyond the paper's world, in words.
     pub what: &'static str,
     /// Whether roads and cars are like that, so that every declaration is one too many.
     pub judged: bool,

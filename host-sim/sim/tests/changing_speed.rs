@@ -30,14 +30,14 @@ fn course(text: &str) -> Course {
 }
 
 fn straight(length_m: f64) -> Course {
-    course(&format!("[[segment]]\nlength = {length_m}"))
+    course(&format!("[[segment]]\nlength_m = {length_m}"))
 }
 
 /// 300 m straight, then a left curve of 200 m of radius.
 fn curve() -> Course {
     course(
-        "[[segment]]\nlength = 300\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.005\n\
-         [[segment]]\nlength = 500\ncurvature = 0.005",
+        "[[segment]]\nlength_m = 300\n[[segment]]\nlength_m = 100\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.005\n\
+         [[segment]]\nlength_m = 500\ncurvature_per_m = 0.005",
     )
 }
 
@@ -149,8 +149,8 @@ fn behind_a_braking_the_vehicle_turns_as_the_textbook_says() {
     let speed = by_place(&[(200.0, 72.0), (350.0, 36.0)]);
     // More than a turn: a driver's integral takes its time at this speed.
     let course = course(
-        "[[segment]]\nlength = 300\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.005\n\
-         [[segment]]\nlength = 1500\ncurvature = 0.005",
+        "[[segment]]\nlength_m = 300\n[[segment]]\nlength_m = 100\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.005\n\
+         [[segment]]\nlength_m = 1500\ncurvature_per_m = 0.005",
     );
     // A driver who moves the wheel because the ECU asks for a hand is not at rest.
     let driver = DriverParameters {
@@ -245,13 +245,13 @@ fn a_failure_in_mid_braking_and_a_clone_there_are_the_runs_that_they_are_of() {
 #[test]
 fn honest_braking_is_no_fault() {
     let course = course(
-        "[[segment]]\nlength = 150\n\
-         [[segment]]\nlength = 80\ncurvature_start = 0\ncurvature_end = 0.0033\n\
-         [[segment]]\nlength = 300\ncurvature = 0.0033\n\
-         [[segment]]\nlength = 160\ncurvature_start = 0.0033\ncurvature_end = -0.0033\n\
-         [[segment]]\nlength = 300\ncurvature = -0.0033\n\
-         [[segment]]\nlength = 80\ncurvature_start = -0.0033\ncurvature_end = 0\n\
-         [[segment]]\nlength = 300",
+        "[[segment]]\nlength_m = 150\n\
+         [[segment]]\nlength_m = 80\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.0033\n\
+         [[segment]]\nlength_m = 300\ncurvature_per_m = 0.0033\n\
+         [[segment]]\nlength_m = 160\ncurvature_start_per_m = 0.0033\ncurvature_end_per_m = -0.0033\n\
+         [[segment]]\nlength_m = 300\ncurvature_per_m = -0.0033\n\
+         [[segment]]\nlength_m = 80\ncurvature_start_per_m = -0.0033\ncurvature_end_per_m = 0\n\
+         [[segment]]\nlength_m = 300",
     );
     // 40 km/h are 11.1 m/s2*s: 3.7 s at 3 m/s2; 60 km/h 5.6 s.
     let mut profiles = Vec::new();

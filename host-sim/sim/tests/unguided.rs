@@ -18,8 +18,8 @@ const HANDS_OFF: u32 = 1 << 19;
 
 /// Straight, then a left curve of a radius of 800 m that is held for a minute at 60 km/h.
 fn held_curve() -> Course {
-    let text = "[[segment]]\nlength = 200\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.00125\n\
-                [[segment]]\nlength = 1000\ncurvature = 0.00125\n";
+    let text = "[[segment]]\nlength_m = 200\n[[segment]]\nlength_m = 100\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.00125\n\
+                [[segment]]\nlength_m = 1000\ncurvature_per_m = 0.00125\n";
     Course::from_toml("held", text).unwrap()
 }
 
@@ -182,7 +182,7 @@ fn what_the_scenario_lets_fail_is_asked_for() {
 #[test]
 fn a_slow_stretch_is_away_until_guidance_is_back() {
     let speed = Speed::by_time_kmh(vec![8.0, 14.5, 25.5, 32.0], &[36.0, 12.6, 12.6, 36.0]);
-    let course = Course::from_toml("s", "[[segment]]\nlength = 400").unwrap();
+    let course = Course::from_toml("s", "[[segment]]\nlength_m = 400").unwrap();
     let scenario = Scenario::builder().course(course).speed(speed).build().unwrap();
     let (found, on_the_bus) = driven(&scenario);
     let [found] = found[..] else { panic!("{found:?}") };

@@ -1,34 +1,22 @@
 //! `host-sim adaptation FILE.toml`.
 
-use std::path::PathBuf;
-
-use clap::Args;
 use haptic_batch::adaptation::Adaptation;
-use haptic_batch::compare::{Kinds, on_threads};
+use haptic_batch::compare::Kinds;
 use haptic_report::document::write_file;
 use haptic_report::studies::adaptation::report;
 
-use super::results::ResultArguments;
+use super::results::StudyFile;
 use super::{BadInput, Outcome, progress};
 
-#[derive(Debug, Args)]
-pub(super) struct Arguments {
-    /// Study file (TOML): laws, drivers whose K_hg follows trust, a road, a loss (docs/explanation/two-adaptations.md)
-    #[arg(value_name = "FILE.toml")]
-    file: PathBuf,
-    /// Threads; default: one a core
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
-    #[command(flatten)]
-    results: ResultArguments,
-}
+/// Help of the file.
+pub(super) const FILE: &str = "Study file (TOML): laws, drivers whose K_hg follows trust, a road, a loss (docs/explanation/two-adaptations.md)";
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
     let study = Adaptation::load(&arguments.file, &kinds)?;
     let output = arguments.results.begin("adaptation")?;
     let results = progress::over(study.drives(), "drives", |done| {
-        on_threads(arguments.threads, || study.run(done))
+        arguments.threads.run(|| study.run(done))
     })??;
     if let Some(place) = output.place() {
         let series = results.to_csv();

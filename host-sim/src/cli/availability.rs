@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use haptic_batch::availability::{Leg, Plan, ROADS, study};
+use haptic_batch::availability::{AvailabilityPlan, DriveSegment, ROADS, study};
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, campaign};
 use haptic_report::studies::availability::{Balance, Detection, report, worlds};
@@ -59,26 +59,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let (checkpoint, on_record) = match &arguments.checkpoint {
         None => (None, Vec::new()),
         Some(path) => {
-            let (checkpoint, legs) = Checkpoint::open::<Leg>(path, &heading(plan.seed)?)?;
-            output::keeps(format!(
-                "{} keeps every drive that was done; the same command goes on from there.",
-                path.display()
-            ))?;
-            (Some(checkpoint), legs)
+            let (checkpoint, segments) = Checkpoint::open::<DriveSegment>(path, &heading(plan.seed)?)?;
+            output::keeps(path, "drive")?;
+            (Some(checkpoint), segments)
         }
     };
-    let bar = progress::bar(plan.legs().len() as u64, "drives of five minutes");
+    let bar = progress::bar(plan.segments().len() as u64, "drives of five minutes");
     bar.inc(
-        plan.legs()
+        plan.segments()
             .iter()
-            .filter(|number| on_record.iter().any(|leg| leg.is(number)))
+            .filter(|number| on_record.iter().any(|segment| segment.is(number)))
             .count() as u64,
     );
-    let results = study(&plan, &on_record, |leg| {
+    let results = study(&plan, &on_record, |segment| {
         bar.inc(1);
         checkpoint
             .as_ref()
-            .map_or(Ok(()), |checkpoint| Ok(checkpoint.add(leg)?))
+            .map_or(Ok(()), |checkpoint| Ok(checkpoint.add(segment)?))
     })?;
     bar.finish_and_clear();
     let results = Balance {
@@ -104,7 +101,7 @@ fn kept_in<'a>(directory: Option<&Path>, checkpoint: Option<&'a Path>) -> Vec<&'
         .collect()
 }
 
-fn plan(arguments: &Arguments) -> Result<Plan, BadInput> {
+fn plan(arguments: &Arguments) -> Result<AvailabilityPlan, BadInput> {
     if !(arguments.hours > 0.0 && arguments.hours <= 100_000.0) {
         let message = format!("--hours: {} is outside 0 to 100000 h", arguments.hours);
         return Err(BadInput(message));
@@ -116,7 +113,7 @@ fn plan(arguments: &Arguments) -> Result<Plan, BadInput> {
         .map_err(|(name, all)| unknown("--worlds", &name, all))?;
     let roads =
         chosen(&arguments.roads, &ROADS, |r| r.name).map_err(|(name, all)| unknown("--roads", &name, all))?;
-    Ok(Plan {
+    Ok(AvailabilityPlan {
         worlds,
         roads,
         hours: arguments.hours,
@@ -144,7 +141,7 @@ fn chosen<T>(
 
 /// What the drives of a file belong to: another program drives others.
 fn heading(seed: u64) -> Result<String, BadInput> {
-    let provenance = haptic_report::document::Provenance::of(None);
+    let provenance = haptic_report::document::Provenance::new(None);
     Ok(serde_json::to_string(&serde_json::json!({
         "study": "availability",
         "seed": seed,
@@ -153,12 +150,12 @@ fn heading(seed: u64) -> Result<String, BadInput> {
 }
 
 /// Every fault in the world that is to be as good as real.
-fn detection(plan: &Plan, seeds: u64) -> Option<Detection> {
+fn detection(plan: &AvailabilityPlan, seeds: u64) -> Option<Detection> {
     let named = plan.worlds.iter().find(|world| world.name == "everything");
     let world = named.or(plan.worlds.last()).filter(|_| seeds > 0)?;
     let rows: Vec<&'static FaultCase> = table::rows().filter(|row| row.place != Place::Target).collect();
     let campaign = progress::over(rows.len() as u64 * seeds, "faults", |done| {
-        campaign::run(&World::real(world), &rows, 1..seeds + 1, done)
+        campaign::run(&World::of_kind(world), &rows, 1..seeds + 1, done)
     });
     Some(Detection {
         world: world.name,

@@ -1,33 +1,22 @@
 //! `host-sim compare FILE.toml`.
 
-use std::path::PathBuf;
-
-use clap::Args;
-use haptic_batch::compare::{Compare, Kinds, on_threads};
+use haptic_batch::compare::{Compare, Kinds};
 use haptic_report::document::write_file;
 use haptic_report::studies::compare::report;
 
-use super::results::ResultArguments;
+use super::results::StudyFile;
 use super::{BadInput, Outcome, progress};
 
-#[derive(Debug, Args)]
-pub(super) struct Arguments {
-    /// Comparison file (TOML): laws, drivers, roads, speeds, seeds, failures, tuning (docs/how-to/compare.md)
-    #[arg(value_name = "FILE.toml")]
-    file: PathBuf,
-    /// Threads; default: one a core
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
-    #[command(flatten)]
-    results: ResultArguments,
-}
+/// Help of the file.
+pub(super) const FILE: &str =
+    "Comparison file (TOML): laws, drivers, roads, speeds, seeds, failures, tuning (docs/how-to/compare.md)";
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
     let compare = Compare::load(&arguments.file, &kinds)?;
     let output = arguments.results.begin("compare")?;
     let results = progress::over(compare.drives(), "drives", |done| {
-        on_threads(arguments.threads, || compare.run(done))
+        arguments.threads.run(|| compare.run(done))
     })??;
     if let Some(place) = output.place() {
         let table = results.to_csv();

@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         )
         .into());
     }
-    let target = arguments.output.as_deref().map(Format::of).transpose()?;
+    let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
     let contents = formats::read(&arguments.input, time.as_ref())?;
     if let (Contents::Frames(frames), Some(output), Some(format)) = (&contents, &arguments.output, target)
         && format.holds_frames()
@@ -112,19 +112,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
 
 fn listed(recording: &Recording) -> Table {
     let row = |line: haptic_log::recording::Line| {
-        vec![
-            Cell::Text(line.name),
-            Cell::Text(line.unit),
-            Cell::Text(line.source),
-            Cell::number(line.sample_rate_hz, 3),
-            Cell::Text(line.samples.to_string()),
+        [
+            ("Channel", Cell::Text(line.name)),
+            ("Unit", Cell::Text(line.unit)),
+            ("Source", Cell::Text(line.source)),
+            ("Rate (Hz)", Cell::number(line.sample_rate_hz, 3)),
+            ("Values", Cell::Text(line.samples.to_string())),
         ]
     };
-    Table::new(
-        "",
-        ["Channel", "Unit", "Source", "Rate (Hz)", "Values"],
-        recording.table().into_iter().map(row),
-    )
+    Table::of_rows("", recording.table().into_iter().map(row))
 }
 
 fn time_column(text: &str) -> Result<TimeColumn, BadInput> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::design::{Question, design, drives};
+use haptic_batch::design::{DesignRequest, design, drives};
 use haptic_report::studies::design::report;
 use haptic_sim::models::road::{Course, LaneChoice};
 
@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .iter()
         .map(|path| road::open(path, &LaneChoice::default()))
         .collect::<Result<Vec<Course>, _>>()?;
-    let question = Question {
+    let question = DesignRequest {
         participants: arguments.participants.numbers(),
         courses,
         frequencies_hz: arguments.frequencies.clone(),

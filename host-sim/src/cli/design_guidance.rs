@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::compare::on_threads;
 use haptic_batch::design_guidance::{DesignGuidance, Evaluated};
 use haptic_report::document::{Provenance, write_file};
 use haptic_report::studies::design_guidance::{parameters, report};
@@ -11,6 +10,7 @@ use serde_json::json;
 
 use super::checkpoint::Checkpoint;
 use super::output;
+use super::progress::Threads;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, progress};
 
@@ -30,9 +30,8 @@ pub(super) struct Arguments {
     /// The row of the report whose set chosen.toml has
     #[arg(long, value_name = "ROW", default_value_t = 1)]
     choose: u32,
-    /// Threads; default: one a core
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    threads: Threads,
     #[command(flatten)]
     results: ResultArguments,
 }
@@ -47,18 +46,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let heading = json!({
         "study": "design-guidance",
         "design": format!("{:016x}", design.identity()),
-        "provenance": Provenance::of(None),
+        "provenance": Provenance::new(None),
     });
     let (checkpoint, known) =
         Checkpoint::open::<Evaluated>(&out.join(SETS), &serde_json::to_string(&heading)?)?;
-    output::keeps(format!(
-        "{} keeps every set that was driven; the same command goes on from there.",
-        out.display()
-    ))?;
+    output::keeps(out, "set")?;
     let output = arguments.results.begin_beside("design-guidance", &[SETS])?;
     let bar = progress::bar(design.sets(), "sets");
     bar.inc(known.len() as u64);
-    let results = on_threads(arguments.threads, || {
+    let results = arguments.threads.run(|| {
         design.run(&known, |set| {
             bar.inc(1);
             Ok(checkpoint.add(set)?)

@@ -78,11 +78,13 @@ enum Command {
     /// Fields vary by lists, ranges and distributions; threads and shards share the drives.
     Sweep(sweep::Arguments),
     /// Every law against every driver, each law tuned first: roads, speeds, seeds, failures
-    Compare(compare::Arguments),
+    #[command(mut_arg("file", |file| file.help(compare::FILE)))]
+    Compare(results::StudyFile),
     /// Gains of the guidance for a population of drivers, judged on held-out drives
     DesignGuidance(design_guidance::Arguments),
     /// A law that adapts to a driver who adapts to it: small gain, equilibria, swings
-    Adaptation(adaptation::Arguments),
+    #[command(mut_arg("file", |file| file.help(adaptation::FILE)))]
+    Adaptation(results::StudyFile),
     /// A road from a file: its lane, length and picture, its centre every metre
     Course(course::Arguments),
     /// A map over speed and delay: where a driver keeps the lane, alone and guided

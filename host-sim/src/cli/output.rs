@@ -22,9 +22,12 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// What an interrupt keeps, as a sentence.
 static KEPT: OnceLock<String> = OnceLock::new();
 
-/// From now on an interrupt says what it keeps of the work under way.
-pub(super) fn keeps(what: String) -> Result<(), BadInput> {
-    KEPT.get_or_init(|| what);
+/// From now on an interrupt says that every part of the work under way which is done is kept there.
+pub(super) fn keeps(place: &Path, part: &str) -> Result<(), BadInput> {
+    KEPT.get_or_init(|| {
+        let place = place.display();
+        format!("{place} keeps every {part} that was done; the same command goes on from there.")
+    });
     catch_interrupts()
 }
 

@@ -1,6 +1,7 @@
 //! The paper's participants on the command line: how many, or which ones.
 
 use clap::Args;
+use haptic_batch::experiment::ExperimentPlan;
 use haptic_core::controller::params::PARAMETERS;
 use haptic_sim::input::{RangeError, in_range};
 use haptic_sim::participants::participants;
@@ -13,6 +14,31 @@ pub(super) fn check_probe(option: &str, amplitude_nm: f64) -> Result<(), RangeEr
     own.map_or(Ok(()), |own| {
         in_range(option, amplitude_nm, own.min..=own.max, own.unit)
     })
+}
+
+/// The drives of an experiment with participants.
+#[derive(Debug, Args)]
+pub(super) struct Drives {
+    #[command(flatten)]
+    participants: Participants,
+    /// Amplitude of the probe in the guided drives, N.m (0: none). The probe is a small torque added to the guidance;
+    /// the driver's answer to it tells K_hg
+    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.0)]
+    probe: f64,
+    /// Seed of the remnants of the first drive of each participant; further drives count on from it
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+impl Drives {
+    pub(super) fn plan(&self) -> Result<ExperimentPlan, RangeError> {
+        check_probe("--probe", self.probe)?;
+        Ok(ExperimentPlan {
+            participants: self.participants.numbers(),
+            probe_nm: self.probe,
+            seed: self.seed,
+        })
+    }
 }
 
 #[derive(Debug, Args)]

@@ -1,6 +1,25 @@
-//! A progress bar on stderr; nothing where stderr is no terminal.
+//! How a command works through its drives: on how many threads, and under a progress bar on stderr; no bar where stderr is no
+//! terminal.
 
+use clap::Args;
+use haptic_batch::compare::on_threads;
 use indicatif::{ProgressBar, ProgressStyle};
+
+use super::BadInput;
+
+#[derive(Debug, Args)]
+pub(super) struct Threads {
+    /// Threads; default: one a core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(super) threads: Option<u32>,
+}
+
+impl Threads {
+    /// Does some work on them.
+    pub(super) fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, BadInput> {
+        Ok(on_threads(self.threads, work)?)
+    }
+}
 
 /// Does some work under a bar of `length` steps.
 pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {

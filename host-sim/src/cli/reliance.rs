@@ -1,7 +1,7 @@
 //! `host-sim reliance`.
 
 use clap::Args;
-use haptic_batch::reliance::{Plan, study};
+use haptic_batch::reliance::{ReliancePlan, study};
 use haptic_report::studies::reliance::report;
 use haptic_sim::input::in_range;
 
@@ -32,7 +32,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     in_range("--t-nms", arguments.t_nms, 0.02..=0.5, "s")?;
     check_probe("--amplitude", arguments.amplitude)?;
-    let plan = Plan {
+    let plan = ReliancePlan {
         participants: arguments.participants.numbers(),
         seeds: arguments.seeds,
         amplitude_nm: arguments.amplitude,

@@ -7,6 +7,7 @@ use haptic_report::document::{Report, write_json};
 use serde::Serialize;
 
 use super::output::Output;
+use super::progress::Threads;
 use super::{BadInput, Outcome, print, print_json, print_notes, width};
 
 /// Help of `--out` where a study always leaves files.
@@ -20,6 +21,17 @@ pub(super) struct ResultArguments {
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
     json: bool,
+}
+
+/// A study's file, and how it is driven.
+#[derive(Debug, Args)]
+pub(super) struct StudyFile {
+    #[arg(value_name = "FILE.toml")]
+    pub(super) file: PathBuf,
+    #[command(flatten)]
+    pub(super) threads: Threads,
+    #[command(flatten)]
+    pub(super) results: ResultArguments,
 }
 
 impl ResultArguments {

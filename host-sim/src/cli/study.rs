@@ -64,10 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             .import(out, &import.session, &import.file)
             .map_err(|e| format!("--import {}: {e}", import.session))?;
     }
-    output::keeps(format!(
-        "{} keeps every session that was done; the same command goes on from there.",
-        out.display()
-    ))?;
+    output::keeps(out, "session")?;
     progress::over(missing as u64, "sessions", |done| study.run(out, done))?;
     let results = study.results(out)?;
     let output = arguments.results.begin("study")?;

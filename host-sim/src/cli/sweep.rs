@@ -13,6 +13,7 @@ use haptic_report::studies::write;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{self, Output};
+use super::progress::Threads;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, print, width};
 
@@ -28,9 +29,8 @@ pub(super) struct Arguments {
     /// copied into) the same directory
     #[arg(long, value_name = "I/N", default_value = "1/1")]
     shard: Shard,
-    /// Threads; default: one a core
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    threads: Threads,
     /// Instead: drive one row of the table again, and compare it with the table if there is one (exit code 1 if it
     /// differs); its scenario is in the printed text
     #[arg(long, value_name = "ROW", conflicts_with_all = ["shard", "threads", "dry_run", "json"])]
@@ -57,11 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let out = arguments.results.directory();
     output::check(out, "sweep", kept(out))?;
     let store = Store::open(&sweep, VERSION, out)?;
-    output::keeps(format!(
-        "{} keeps every chunk that was done; the same command goes on from there.",
-        out.display()
-    ))?;
-    let threads = arguments.threads.map_or_else(
+    output::keeps(out, "chunk")?;
+    let threads = arguments.threads.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         |threads| threads as usize,
     );

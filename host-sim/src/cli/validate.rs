@@ -2,17 +2,15 @@
 
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
-use haptic_batch::experiment::{
-    CHANNELS, POPULATION, Plan, changes, corruptions, methods, recordings, repeat,
-};
+use haptic_batch::experiment::{CHANNELS, POPULATION, changes, corruptions, methods, recordings, repeat};
 use haptic_report::studies::validation::Validation;
 
-use super::participants::{Participants, check_probe};
+use super::participants::Drives;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("question").required(true))]
+#[command(group = ArgGroup::new("question").required(true), mut_arg("probe", |probe| probe.default_value("0.2")))]
 pub(super) struct Arguments {
     /// Drive N times with each participant, and ask whether the 95 % intervals of each parameter hold the truth in 93 to
     /// 97 % of the drives (200 drives tell). Exit code 1 if they do not
@@ -40,24 +38,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings"])]
     only: String,
     #[command(flatten)]
-    participants: Participants,
-    /// Amplitude of the probe, N.m (0: none): a small torque added to the guidance, whose answer tells K_hg
-    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.2)]
-    probe: f64,
-    /// Seed of the remnants of the first drive of each participant; the others count on from it
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    drives: Drives,
     #[command(flatten)]
     results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    check_probe("--probe", arguments.probe)?;
-    let plan = Plan {
-        participants: arguments.participants.numbers(),
-        probe_nm: arguments.probe,
-        seed: arguments.seed,
-    };
+    let plan = arguments.drives.plan()?;
     let ways = POPULATION
         .iter()
         .filter(|(name, _)| name.contains(&arguments.only));

@@ -7,14 +7,14 @@ use super::{host_sim, stderr};
 fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     let directory = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
-    write("short.toml", "[[segment]]\nlength = 10\n");
-    write("tight.toml", "[[segment]]\nlength = 100\ncurvature = 3\n");
+    write("short.toml", "[[segment]]\nlength_m = 10\n");
+    write("tight.toml", "[[segment]]\nlength_m = 100\ncurvature_per_m = 3\n");
     write("unknown.toml", "[driver]\nt_q = 1\n");
     write("manual.toml", "condition = 'manual'\n");
     write("exact.toml", "sensors = 'exact'\n");
     write("late.toml", "[failure]\nkind = 'torque'\ntime_s = 5000\n");
     write("empty.toml", "");
-    write("course.toml", "[[segment]]\nlength = 500\n");
+    write("course.toml", "[[segment]]\nlength_m = 500\n");
     write("on-a-tight-road.toml", "course = 'tight.toml'\n");
     write("notes.txt", "of somebody");
     let cases: [(&[&str], &str); 30] = [
@@ -52,7 +52,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
             "--window to = 3351 m is outside 0 to 3350 m",
         ),
         (&["evaluate", "--course", "short.toml"], "look-ahead"),
-        (&["evaluate", "--course", "tight.toml"], "curvature = 3"),
+        (&["evaluate", "--course", "tight.toml"], "curvature_per_m = 3"),
         (
             &["evaluate", "--speed", "5"],
             "--speed = 5 km/h is outside 20 to 250 km/h",

@@ -285,9 +285,9 @@ fn courses_of_our_own_are_saved_and_read_back() {
     let saved = directory.path().join("saved.xodr");
     let saved = saved.to_str().unwrap();
     let banked = directory.path().join("banked.toml");
-    let text = "lane_width = 3.25\n[[segment]]\nlength = 40\nbank = -0.02\n[[segment]]\nlength = 50\ncurvature_start = 0\n\
-                curvature_end = 0.01\nbank_start = -0.02\nbank_end = -0.06\ngrade_start = 0\ngrade_end = 0.05\n\
-                [[segment]]\nlength = 33.3\ncurvature = 0.01\nbank = -0.06\ngrade = 0.05\n";
+    let text = "lane_width_m = 3.25\n[[segment]]\nlength_m = 40\nbank_rad = -0.02\n[[segment]]\nlength_m = 50\ncurvature_start_per_m = 0\n\
+                curvature_end_per_m = 0.01\nbank_start_rad = -0.02\nbank_end_rad = -0.06\ngrade_start = 0\ngrade_end = 0.05\n\
+                [[segment]]\nlength_m = 33.3\ncurvature_per_m = 0.01\nbank_rad = -0.06\ngrade = 0.05\n";
     std::fs::write(&banked, text).unwrap();
     let of_test = |name: &str| format!("tests/data/xodr/{name}.xodr");
     let files = [

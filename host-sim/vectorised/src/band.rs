@@ -3,7 +3,7 @@
 use haptic_core::controller::config::LEAST_BAND_NM;
 use haptic_core::safety::monitor::{ASTRAY_MS, RATE_SPAN_US};
 
-use super::counts::{flag, whole};
+use super::counts::{flag, truncated};
 use super::rejected::Reason;
 
 /// Who decides the torque.
@@ -108,8 +108,8 @@ impl<const N: usize> Band<N> {
             let both = position + rate;
             let high = position.max(both).max(0.0) + self.half[l];
             let low = position.min(both).min(0.0) - self.half[l];
-            self.high[l] = whole(high.min(1e6));
-            self.low[l] = whole(low.max(-1e6));
+            self.high[l] = truncated(high.min(1e6));
+            self.low[l] = truncated(low.max(-1e6));
         }
     }
 

@@ -10,7 +10,7 @@ use haptic_core::safety::coast;
 use haptic_core::safety::motion_history::MotionHistory;
 use haptic_core::safety::plausibility::PlausibilityState;
 
-use super::counts::{MS, ONE, bits, ms, on_the_bus, per_second, small_bits, whole};
+use super::counts::{MS, ONE, bits, ms, on_the_bus, per_second, small_bits, truncated};
 
 /// Without a picture guidance goes on for so long, ms, by so much at a time.
 pub(super) const BLIND_MS: u32 = ms(coast::MOST_BLIND);
@@ -33,8 +33,8 @@ pub(super) struct Coast {
     /// What came of the vehicle in this step.
     came: Option<[f64; 2]>,
     last: LaneSample,
-    /// What the law asked for then.
-    pub(super) asked: i32,
+    /// The torque that the law demanded then.
+    pub(super) demanded: i32,
 }
 
 impl Coast {
@@ -48,7 +48,7 @@ impl Coast {
             heard: 0,
             came: None,
             last: LaneSample::default(),
-            asked: 0,
+            demanded: 0,
         }
     }
 
@@ -101,14 +101,17 @@ impl Coast {
     }
 
     /// Where the lane went on to in this step, in counts, and how long that took, ms.
-    pub(super) fn go_on(&mut self, step: u32) -> Option<([i32; 2], u32)> {
+    pub(super) fn extrapolate(&mut self, step: u32) -> Option<([i32; 2], u32)> {
         let passed = step - self.heard;
         let extrapolated_lane = (passed >= GOES_ON_MS).then(|| {
             let checks = &self.config.plausibility;
             let sample =
                 checks.extrapolated_lane(&self.state, &self.motion_history, at(step), &self.last, at(step));
             self.take(step, sample);
-            let counts = [whole(sample.e_y.m() * ONE), whole(sample.e_theta.rad() * ONE)];
+            let counts = [
+                truncated(sample.e_y.m() * ONE),
+                truncated(sample.e_theta.rad() * ONE),
+            ];
             (counts, passed)
         });
         if let Some(came) = self.came.take() {
@@ -118,13 +121,13 @@ impl Coast {
     }
 
     /// What is left of what the law asks for, and of the share that acts.
-    pub(super) fn left(&self, lost_ms: u32, asked: i32, share: i32) -> (i32, i32) {
+    pub(super) fn left(&self, lost_ms: u32, demanded: i32, share: i32) -> (i32, i32) {
         let away = lost_ms as i32 * 1000 * bits(coast::AWAY_PER_US.nm());
-        let asked = asked
-            .max(self.asked.saturating_sub(away))
-            .min(self.asked.saturating_add(away));
+        let demanded = demanded
+            .max(self.demanded.saturating_sub(away))
+            .min(self.demanded.saturating_add(away));
         let trust = (1 << 24) + lost_ms as i32 * per_second(FALL, MS);
-        (asked, share_of(share, trust))
+        (demanded, share_of(share, trust))
     }
 }
 

@@ -21,12 +21,12 @@ pub(super) const fn bits(si: f64) -> i32 {
 #[inline(always)]
 pub(super) fn small_bits(si: f64) -> i32 {
     let scaled = si * ONE;
-    whole(scaled + 0.5_f64.copysign(scaled))
+    truncated(scaled + 0.5_f64.copysign(scaled))
 }
 
 /// Toward zero; of less than 2^31.
 #[inline(always)]
-pub(super) fn whole(value: f64) -> i32 {
+pub(super) fn truncated(value: f64) -> i32 {
     // 1.5 * 2^52: what is added to it stands in its lowest bits.
     const AT_THE_END: f64 = 6_755_399_441_055_744.0;
     (value.trunc() + AT_THE_END).to_bits() as i32

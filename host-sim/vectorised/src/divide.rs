@@ -30,7 +30,7 @@ impl Divisor {
     ///
     /// Fused where the machine multiplies and adds in one instruction; elsewhere that would be a call.
     #[inline(always)]
-    pub(super) fn of<const FUSED: bool>(&self, value: f64) -> f64 {
+    pub(super) fn divide<const FUSED: bool>(&self, value: f64) -> f64 {
         if FUSED {
             value.mul_add(self.inverse, value * self.rest)
         } else {
@@ -61,14 +61,14 @@ mod tests {
         });
         for value in any.filter(is_ordinary).chain(small).chain(edges) {
             for divisor in [SIX, TWENTY_FOUR, FORTY] {
-                let (fused, plain) = (divisor.of::<true>(value), value / divisor.by);
+                let (fused, plain) = (divisor.divide::<true>(value), value / divisor.by);
                 assert_eq!(fused.to_bits(), plain.to_bits(), "{value:e} / {}", divisor.by);
             }
         }
         for zero in [0.0, -0.0_f64] {
-            assert_eq!(SIX.of::<true>(zero).to_bits(), zero.to_bits());
-            assert_eq!(TWENTY_FOUR.of::<true>(zero).to_bits(), zero.to_bits());
-            assert_eq!(FORTY.of::<true>(zero), 0.0);
+            assert_eq!(SIX.divide::<true>(zero).to_bits(), zero.to_bits());
+            assert_eq!(TWENTY_FOUR.divide::<true>(zero).to_bits(), zero.to_bits());
+            assert_eq!(FORTY.divide::<true>(zero), 0.0);
         }
     }
 }

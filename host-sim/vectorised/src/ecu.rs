@@ -12,7 +12,7 @@ use haptic_core::safety::{envelope, hands, plausibility, ramp};
 
 use super::band::{Band, GUIDED, HANDOVER, OFF};
 use super::coast::{Coast, GOES_ON_MS};
-use super::counts::{MS, ONE, bits, flag, ms, on_the_bus, per_second, small_bits, speed_heard, whole};
+use super::counts::{MS, ONE, bits, flag, ms, on_the_bus, per_second, small_bits, speed_heard, truncated};
 use super::probe::Probes;
 use super::rejected::Reason;
 use haptic_sim::models::sensors::TORQUE_RESOLUTION_NM;
@@ -108,7 +108,7 @@ fn filtered(tau: i32, rate: i32, change: i32, dt_us: i32) -> i32 {
     let sum = i64::from(tau).wrapping_mul(i64::from(rate)).wrapping_add(change);
     let span = tau.wrapping_add(dt_us << 8);
     let size = sum.wrapping_abs().wrapping_add(i64::from(span >> 1));
-    let near = whole((size as f64 / f64::from(span)).min(f64::from(MAX_RATE)));
+    let near = truncated((size as f64 / f64::from(span)).min(f64::from(MAX_RATE)));
     let rest = size.wrapping_sub(i64::from(near).wrapping_mul(i64::from(span)));
     let more = if rest >= i64::from(span) { 1 } else { 0 };
     let less = if rest < 0 { 1 } else { 0 };
@@ -266,17 +266,17 @@ impl<const N: usize> Ecus<N> {
 
     /// The lane goes on without a picture where there is none any more.
     #[cold]
-    fn go_on(&mut self, lane: usize, step: u32) -> Option<u32> {
+    fn extrapolate(&mut self, lane: usize, step: u32) -> Option<u32> {
         let lost_ms = self.coasts[lane].as_ref()?.lost_ms(step)?;
-        let asked = self.asked(lane).0;
+        let demanded = self.demanded(lane).0;
         let coast = self.coasts[lane].as_mut()?;
         if lost_ms == 1 {
-            coast.asked = asked;
+            coast.demanded = demanded;
             let has_probe = flag(self.probes.is_on(lane));
             self.suspect[lane] |= has_probe & self.matters[lane] & Reason::FailureWithProbe.bit();
         }
         self.band.grow(lane, lost_ms);
-        if let Some(([e_y, e_theta], passed_ms)) = coast.go_on(step) {
+        if let Some(([e_y, e_theta], passed_ms)) = coast.extrapolate(step) {
             let (tau, dt_us) = (self.tau[lane], (passed_ms * 1000) as i32);
             let moved = e_y.wrapping_sub(self.e_y[lane]);
             let turned = e_theta.wrapping_sub(self.e_theta[lane]);
@@ -331,7 +331,7 @@ impl<const N: usize> Ecus<N> {
         }
         let dt_us = (dt_ms * 1000) as i32;
         for l in 0..N {
-            let (e_y, e_theta) = (whole(seen[0][l] * ONE), whole(seen[1][l] * ONE));
+            let (e_y, e_theta) = (truncated(seen[0][l] * ONE), truncated(seen[1][l] * ONE));
             let (moved, turned) = (
                 e_y.wrapping_sub(self.e_y[l]),
                 e_theta.wrapping_sub(self.e_theta[l]),
@@ -415,9 +415,9 @@ impl<const N: usize> Ecus<N> {
             .judge(&self.applied, &self.mode, &self.matters, &mut self.suspect);
     }
 
-    /// Equation (9): what is asked for, and whether it needs more than 32 bits, where core saturates.
+    /// Equation (9): the torque that it demands, and whether it needs more than 32 bits, where core saturates.
     #[inline(always)]
-    fn asked(&self, l: usize) -> (i32, bool) {
+    fn demanded(&self, l: usize) -> (i32, bool) {
         let [on_e_y, on_e_y_rate, on_e_theta, on_e_theta_rate] = &self.gains;
         let now = |error: i32, rate: i32| {
             ((error >> 3).wrapping_add(1) >> 1).wrapping_add(per_second(rate, i64::from(self.age[l])))
@@ -437,20 +437,20 @@ impl<const N: usize> Ecus<N> {
         let mut lost = [None; N];
         if self.has_coasts {
             for l in 0..N {
-                lost[l] = self.go_on(l, own[l] as u32);
+                lost[l] = self.extrapolate(l, own[l] as u32);
             }
         }
         for l in 0..N {
-            let (asked, is_wide) = self.asked(l);
+            let (demanded, is_wide) = self.demanded(l);
             self.suspect[l] |= flag(is_wide) & self.matters[l] & Reason::Law.bit();
-            let shared = term(self.scheduled[l], asked).wrapping_add(1 << 23);
+            let shared = term(self.scheduled[l], demanded).wrapping_add(1 << 23);
             wanted[l] = ((shared as u64) >> 24) as i32;
         }
         if self.has_coasts {
             for l in 0..N {
                 if let (Some(coast), Some(lost_ms)) = (&self.coasts[l], lost[l]) {
-                    let (asked, share) = coast.left(lost_ms, self.asked(l).0, self.scheduled[l]);
-                    let shared = term(share, asked).wrapping_add(1 << 23);
+                    let (demanded, share) = coast.left(lost_ms, self.demanded(l).0, self.scheduled[l]);
+                    let shared = term(share, demanded).wrapping_add(1 << 23);
                     wanted[l] = ((shared as u64) >> 24) as i32;
                 }
             }

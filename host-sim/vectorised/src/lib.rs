@@ -28,9 +28,9 @@ mod coast;
 mod counts;
 mod divide;
 mod ecu;
+mod nonlinear;
 mod points;
 mod probe;
-mod real;
 mod rejected;
 mod runs;
 mod sensing;
@@ -44,6 +44,7 @@ use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
 use haptic_sim::models::STEP_S;
+use haptic_sim::models::plant::{ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::{Outcome, Run};
 use runs::Runs;
@@ -52,13 +53,6 @@ pub use rejected::{Reason, unsupported_reason};
 
 /// Runs side by side.
 pub const BATCH: usize = 8;
-/// Places of the states, as the plant has them.
-const BETA: usize = 0;
-const YAW_RATE: usize = 1;
-const WHEEL: usize = 2;
-const WHEEL_RATE: usize = 3;
-const ARM: usize = 4;
-const YAW: usize = 5;
 
 /// All bits of a lane that is under way.
 const ALIVE: u64 = u64::MAX;

@@ -43,15 +43,15 @@ impl<const N: usize> Points<N> {
         (self.e_y[lane], self.e_theta[lane]) = (0.0, 0.0);
     }
 
-    /// Looks at the road from a place in a direction, as a unit vector and as an angle, in the runs that are asked for.
+    /// Looks at the road from a place in a direction, as a unit vector and as an angle, in the runs that are selected.
     /// Which of them has no foot, or an angle that would have to be wrapped, becomes suspect.
     #[inline(always)]
-    pub(super) fn look<const FUSED: bool>(
+    pub(super) fn observe<const FUSED: bool>(
         &mut self,
         roads: &[Arc<Centreline>; N],
         (x, y, direction): (&[f64; N], &[f64; N], &[[f64; N]; 2]),
         chi: &[f64; N],
-        asked: &[u64; N],
+        selected: &[u64; N],
         suspect: &mut [u64; N],
     ) {
         let (mut px, mut py) = ([0.0; N], [0.0; N]);
@@ -59,17 +59,17 @@ impl<const N: usize> Points<N> {
             px[l] = x[l] + self.near_m[l] * direction[0][l];
             py[l] = y[l] + self.near_m[l] * direction[1][l];
         }
-        let lost_near = self.near.project::<FUSED, OFFSET>(roads, &px, &py, asked);
+        let lost_near = self.near.project::<FUSED, OFFSET>(roads, &px, &py, selected);
         for l in 0..N {
             px[l] = x[l] + self.far_m[l] * direction[0][l];
             py[l] = y[l] + self.far_m[l] * direction[1][l];
         }
-        let lost_far = self.far.project::<FUSED, HEADING>(roads, &px, &py, asked);
+        let lost_far = self.far.project::<FUSED, HEADING>(roads, &px, &py, selected);
         for l in 0..N {
             // An angle that would have to be wrapped is that of a run that turns.
             let e_theta = self.far.found_heading[l] - chi[l];
             let is_sound = e_theta.abs() < FRAC_PI_2;
-            suspect[l] |= lost_near[l] | lost_far[l] | if is_sound { 0 } else { asked[l] };
+            suspect[l] |= lost_near[l] | lost_far[l] | if is_sound { 0 } else { selected[l] };
             self.e_y[l] = -self.near.offset[l];
             self.e_theta[l] = e_theta;
         }

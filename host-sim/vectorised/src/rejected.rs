@@ -5,7 +5,7 @@ use std::fmt;
 use haptic_core::controller::params::{Params, VehicleParams};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::real::WorldParameters;
+use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::tolerances::Car;
 use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::scenario::{
@@ -14,89 +14,71 @@ use haptic_sim::scenario::{
 
 use super::counts::{ONE, speed_heard};
 
-/// Why a run is rejected: the shipping ECU drives it alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Reason {
+/// Declares the reasons: what each is, and what a study says of it.
+macro_rules! reasons {
+    ($($(#[$doc:meta])* $name:ident $says:literal;)*) => {
+        /// Why a run is rejected: the shipping ECU drives it alone.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum Reason {
+            $($(#[$doc])* $name,)*
+        }
+
+        impl Reason {
+            /// Every reason, those that are known before a run begins first, with what a study says of them.
+            pub const ALL: [(Self, &str); [$($says),*].len()] = [$((Self::$name, $says)),*];
+        }
+    };
+}
+
+reasons! {
     /// A camera whose pictures come late, that is blind at times, or that jumps to another line.
-    Camera,
+    Camera "a camera that is late, blind at times, or on another line";
     /// Another law than the paper's.
-    AnotherLaw,
+    AnotherLaw "another law than the paper's";
     /// Exact sensors, past the bus.
-    ExactSensors,
+    ExactSensors "exact sensors, past the bus";
     /// Slower than the controller guides.
-    TooSlow,
+    TooSlow "slower than is guided";
     /// The lane preview fails within the first two seconds, while the ECU does not know its sender's period yet.
-    EarlyFailure,
+    EarlyFailure "a lane preview that fails within the first 2 s";
     /// A failure that ends: the ECU comes back.
-    FailureEnds,
+    FailureEnds "a failure that ends";
     /// Longer than the clock of vectorised runs counts.
-    TooLong,
+    TooLong "longer than 2000 s";
     /// Too few runs are left for a batch.
-    TooFew,
+    TooFew "too few for a batch";
     /// The lane preview fails beside a probe, which winds down meanwhile.
-    FailureWithProbe,
+    FailureWithProbe "a lane preview that fails beside a probe";
     /// Near the end of what a frame carries.
-    SensorRange,
+    SensorRange "a sensor near the end of its range";
     /// A picture that is far from the one before.
-    LaneStep,
+    LaneStep "lane errors that jump";
     /// A speed that steps, or is less than is guided.
-    Speed,
+    Speed "a speed that jumps, or is too slow";
     /// No hand is felt at the wheel.
-    HandsOff,
+    HandsOff "no hand at the wheel";
     /// The driver overrides the guidance.
-    Override,
+    Override "a driver who overrides";
     /// The law asks for more than its sum holds.
-    Law,
+    Law "a law out of its range";
     /// The torque is near the end of the monitor's band.
-    MonitorBand,
+    MonitorBand "near the end of the monitor's band";
     /// The column check is near its margin.
-    ColumnCheck,
+    ColumnCheck "near the margin of the column check";
     /// The lane check is near its margin.
-    LaneCheck,
+    LaneCheck "near the margin of the lane check";
     /// The yaw rate is near what wheel angle and speed deny.
-    YawRate,
+    YawRate "near the margin of the yaw rate's check";
     /// The motor does not deliver what it is told.
-    Motor,
+    Motor "a motor that does not obey";
     /// The vehicle leaves the road, or turns wildly.
-    OffRoad,
+    OffRoad "off the road";
     /// The vehicle weaves so far that its way is 1 % longer than the course.
-    Detour,
+    Detour "a way longer than the course";
 }
 
 impl Reason {
-    /// Every reason, those that are known before a run begins first, with what a study says of them.
-    pub const ALL: [(Self, &str); 22] = [
-        (
-            Self::Camera,
-            "a camera that is late, blind at times, or on another line",
-        ),
-        (Self::AnotherLaw, "another law than the paper's"),
-        (Self::ExactSensors, "exact sensors, past the bus"),
-        (Self::TooSlow, "slower than is guided"),
-        (
-            Self::EarlyFailure,
-            "a lane preview that fails within the first 2 s",
-        ),
-        (Self::FailureEnds, "a failure that ends"),
-        (Self::TooLong, "longer than 2000 s"),
-        (Self::TooFew, "too few for a batch"),
-        (Self::FailureWithProbe, "a lane preview that fails beside a probe"),
-        (Self::SensorRange, "a sensor near the end of its range"),
-        (Self::LaneStep, "lane errors that jump"),
-        (Self::Speed, "a speed that jumps, or is too slow"),
-        (Self::HandsOff, "no hand at the wheel"),
-        (Self::Override, "a driver who overrides"),
-        (Self::Law, "a law out of its range"),
-        (Self::MonitorBand, "near the end of the monitor's band"),
-        (Self::ColumnCheck, "near the margin of the column check"),
-        (Self::LaneCheck, "near the margin of the lane check"),
-        (Self::YawRate, "near the margin of the yaw rate's check"),
-        (Self::Motor, "a motor that does not obey"),
-        (Self::OffRoad, "off the road"),
-        (Self::Detour, "a way longer than the course"),
-    ];
-
     /// Its bit in a run's doubts.
     pub(super) const fn bit(self) -> i32 {
         1 << self as u32

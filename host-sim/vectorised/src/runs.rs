@@ -1,6 +1,6 @@
 //! The runs that are under way in the lanes, and their millisecond.
 
-mod hear;
+mod receive;
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ struct Steps<const N: usize> {
 thread_local! {
     /// Room for the samples of a lane each, from the runs before: new room of some megabytes a run would be handed back to
     /// the system and asked for again with every call, page by page.
-    static ROOM: Cell<Vec<Vec<Sample>>> = const { Cell::new(Vec::new()) };
+    static BUFFERS: Cell<Vec<Vec<Sample>>> = const { Cell::new(Vec::new()) };
 }
 
 /// What a lane has of its run beside the arrays.
@@ -87,7 +87,7 @@ pub(super) struct Runs<const N: usize> {
 impl<const N: usize> Runs<N> {
     pub(super) fn new(whole: usize, any: &Scenario, every_step: bool) -> Self {
         let road = any.course().centreline();
-        let mut room = ROOM.take();
+        let mut buffers = BUFFERS.take();
         Self {
             worlds: Worlds::new(whole),
             ecus: Ecus::new(),
@@ -107,7 +107,7 @@ impl<const N: usize> Runs<N> {
                 run: Run {
                     trace: Trace {
                         sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
-                        samples: room.pop().unwrap_or_default(),
+                        samples: buffers.pop().unwrap_or_default(),
                     },
                     ending: Ending::CourseEnd,
                     steps: 0,
@@ -125,9 +125,11 @@ impl<const N: usize> Runs<N> {
         let plan = Plan::new(scenario, pair.look_ahead_s());
         self.worlds.begin(lane, scenario, &road, &plan);
         let has_banks = !scenario.course().is_level();
-        self.worlds.real.begin(lane, pair.nonlinear.take(), has_banks);
+        self.worlds
+            .nonlinear
+            .begin(lane, pair.nonlinear.take(), has_banks);
         self.speeds.begin(lane, scenario, &plan);
-        self.senses.begin(lane, Sensing::of(scenario));
+        self.senses.begin(lane, Sensing::new(scenario));
         self.ecus.begin(lane, scenario);
         self.checks.begin(lane, scenario);
         self.own[lane] = 0;
@@ -269,20 +271,20 @@ impl<const N: usize> Runs<N> {
         let is_sample = phase.is_multiple_of(STEPS_PER_SAMPLE);
         let looks = camera_looks(phase);
         if looks || is_sample {
-            let mut asked = self.worlds.alive;
+            let mut selected = self.worlds.alive;
             if !is_sample {
                 for l in 0..N {
-                    asked[l] &= self.looks[l];
+                    selected[l] &= self.looks[l];
                 }
             }
-            self.worlds.camera_looks::<FUSED>(&self.roads, &asked);
+            self.worlds.camera_looks::<FUSED>(&self.roads, &selected);
         }
         self.draw_remnants();
         let mut driver_nm = [0.0; N];
         for l in 0..N {
             driver_nm[l] = self.worlds.state[ARM][l] + self.worlds.remnant_nm[l];
         }
-        self.hear(phase, looks, &driver_nm);
+        self.receive(phase, looks, &driver_nm);
         self.hear_motors(phase);
         self.ecus.decide(&self.own, phase == 0, is_sample);
         let torque_nm = self.ecus.torque_nm();
@@ -308,7 +310,7 @@ impl<const N: usize> Runs<N> {
         let speeds = self.speeds.of_step(&self.own);
         self.worlds
             .move_on::<FUSED>(&torque_nm, speeds, self.has_remnants);
-        self.speeds.go_on(&mut self.worlds, &self.roads);
+        self.speeds.advance(&mut self.worlds, &self.roads);
         for own in &mut self.own {
             *own = own.wrapping_add(1);
         }
@@ -391,7 +393,7 @@ impl<const N: usize> Runs<N> {
 
 impl<const N: usize> Drop for Runs<N> {
     fn drop(&mut self) {
-        ROOM.set(
+        BUFFERS.set(
             self.slots
                 .iter_mut()
                 .map(|slot| std::mem::take(&mut slot.run.trace.samples))

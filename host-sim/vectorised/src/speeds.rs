@@ -74,7 +74,7 @@ impl<const N: usize> Speeds<N> {
 
     /// Messages of the vehicles reach the ECUs.
     #[inline(always)]
-    pub(super) fn hear(&mut self, ecus: &mut Ecus<N>, checks: &mut Checks<N>, matters: &[i32; N]) {
+    pub(super) fn receive(&mut self, ecus: &mut Ecus<N>, checks: &mut Checks<N>, matters: &[i32; N]) {
         if !self.is_any {
             return;
         }
@@ -116,7 +116,7 @@ impl<const N: usize> Speeds<N> {
 
     /// The step is over.
     #[inline(always)]
-    pub(super) fn go_on(&mut self, worlds: &mut Worlds<N>, roads: &[Arc<Centreline>; N]) {
+    pub(super) fn advance(&mut self, worlds: &mut Worlds<N>, roads: &[Arc<Centreline>; N]) {
         if !self.is_any {
             return;
         }

@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use super::*;
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::real::{Tyres, WorldParameters};
+use haptic_sim::models::nonlinear::{Tyres, WorldParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::models::tolerances::Tolerances;
 use haptic_sim::scenario::{
@@ -49,17 +49,17 @@ fn compare(scenarios: &[Scenario], width: Width) -> usize {
 }
 
 fn short_course() -> Course {
-    let text = "[[segment]]\nlength = 120\n[[segment]]\nlength = 60\ncurvature_start = 0\ncurvature_end = 0.004\n\
-        [[segment]]\nlength = 150\ncurvature = 0.004\n[[segment]]\nlength = 60\ncurvature_start = 0.004\n\
-        curvature_end = -0.003\n[[segment]]\nlength = 200\ncurvature = -0.003\n[[segment]]\nlength = 150";
+    let text = "[[segment]]\nlength_m = 120\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.004\n\
+        [[segment]]\nlength_m = 150\ncurvature_per_m = 0.004\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0.004\n\
+        curvature_end_per_m = -0.003\n[[segment]]\nlength_m = 200\ncurvature_per_m = -0.003\n[[segment]]\nlength_m = 150";
     Course::from_toml("short.toml", text).unwrap()
 }
 
 fn banked_course() -> Course {
-    let text = "[[segment]]\nlength = 120\nbank = -0.025\n[[segment]]\nlength = 60\ncurvature_start = 0\n\
-        curvature_end = 0.004\nbank_start = -0.025\nbank_end = -0.06\n[[segment]]\nlength = 150\ncurvature = 0.004\n\
-        bank = -0.06\n[[segment]]\nlength = 60\ncurvature_start = 0.004\ncurvature_end = -0.003\nbank_start = -0.06\n\
-        bank_end = 0.04\n[[segment]]\nlength = 200\ncurvature = -0.003\nbank = 0.04\n[[segment]]\nlength = 150";
+    let text = "[[segment]]\nlength_m = 120\nbank_rad = -0.025\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0\n\
+        curvature_end_per_m = 0.004\nbank_start_rad = -0.025\nbank_end_rad = -0.06\n[[segment]]\nlength_m = 150\ncurvature_per_m = 0.004\n\
+        bank_rad = -0.06\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0.004\ncurvature_end_per_m = -0.003\nbank_start_rad = -0.06\n\
+        bank_end_rad = 0.04\n[[segment]]\nlength_m = 200\ncurvature_per_m = -0.003\nbank_rad = 0.04\n[[segment]]\nlength_m = 150";
     Course::from_toml("banked.toml", text).unwrap()
 }
 
@@ -84,7 +84,7 @@ fn erring(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) ->
 }
 
 /// Cars that differ, tyres, column, motor, wind and a road that lies aslant, each in some of the worlds.
-fn real(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
+fn nonlinear(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
     let mut some = |share: f64, from: f64, to: f64, off: f64| {
         let value = between(from, to);
         if between(0.0, 1.0) < share { value } else { off }
@@ -261,9 +261,9 @@ fn sensors_with_errors_are_the_same_side_by_side_and_few_are_suspect() {
 
 #[test]
 fn real_worlds_are_the_same_side_by_side_and_few_are_suspect() {
-    let suspects = compare(&random(80, 4, real), Width::Widest);
+    let suspects = compare(&random(80, 4, nonlinear), Width::Widest);
     assert!(suspects < 50, "{suspects} of 80");
-    let both: Beside = |builder, between| real(erring(builder, between), between);
+    let both: Beside = |builder, between| nonlinear(erring(builder, between), between);
     let suspects = compare(&random(60, 5, both), Width::Widest);
     assert!(suspects < 40, "{suspects} of 60");
 }
@@ -272,7 +272,7 @@ fn real_worlds_are_the_same_side_by_side_and_few_are_suspect() {
 fn speeds_that_change_are_the_same_side_by_side_and_few_are_suspect() {
     let suspects = compare(&random(40, 8, changing), Width::Widest);
     assert!(suspects < 25, "{suspects} of 40");
-    let all: Beside = |builder, between| changing(real(erring(builder, between), between), between);
+    let all: Beside = |builder, between| changing(nonlinear(erring(builder, between), between), between);
     let suspects = compare(&random(40, 9, all), Width::Widest);
     assert!(suspects < 30, "{suspects} of 40");
 }
@@ -281,7 +281,7 @@ fn speeds_that_change_are_the_same_side_by_side_and_few_are_suspect() {
 #[test]
 fn every_step_is_reported_and_runs_are_cut_where_it_is_options() {
     let mut scenarios = random(20, 11, |builder, _| builder);
-    scenarios.extend(random(12, 12, real));
+    scenarios.extend(random(12, 12, nonlinear));
     let mut steps: Vec<Vec<Step>> = vec![Vec::new(); scenarios.len()];
     let (mut cut, mut whole) = (Vec::new(), 0);
     let mut options = Options {
@@ -326,7 +326,7 @@ fn every_step_is_reported_and_runs_are_cut_where_it_is_options() {
 fn every_width_gives_the_same() {
     let mut scenarios = random(16, 2, |builder, _| builder);
     scenarios.extend(random(8, 6, erring));
-    scenarios.extend(random(16, 7, real));
+    scenarios.extend(random(16, 7, nonlinear));
     scenarios.extend(random(8, 10, changing));
     for width in [Width::Widest, Width::Avx2, Width::Portable] {
         compare(&scenarios, width);

@@ -149,18 +149,18 @@ impl<const N: usize> Tracked<N> {
         }
     }
 
-    /// Projects a point of each run that is asked for; returns which of them found no foot.
+    /// Projects a point of each run that is selected; returns which of them found no foot.
     #[inline(always)]
     pub(super) fn project<const FUSED: bool, const KEPT: u8>(
         &mut self,
         roads: &[Arc<Centreline>; N],
         px: &[f64; N],
         py: &[f64; N],
-        asked: &[u64; N],
+        selected: &[u64; N],
     ) -> [u64; N] {
         let mut places = Aligned(([0.0; N], [0; N]));
         let (at, outside) = (&mut places.0.0, &mut places.0.1);
-        let mut open = *asked;
+        let mut open = *selected;
         for l in 0..N {
             at[l] = self.s[l] + self.advance[l];
         }
@@ -208,7 +208,7 @@ impl<const N: usize> Tracked<N> {
                 ARC => (
                     sigma * k0,
                     sigma - sigma2 * sigma * self.square_over_6[l],
-                    sigma2 * (0.5 * k0 - TWENTY_FOUR.of::<FUSED>(self.cube[l] * sigma2)),
+                    sigma2 * (0.5 * k0 - TWENTY_FOUR.divide::<FUSED>(self.cube[l] * sigma2)),
                     k0,
                 ),
                 _ => (
@@ -217,10 +217,10 @@ impl<const N: usize> Tracked<N> {
                         - sigma2
                             * sigma
                             * (self.square_over_6[l]
-                                + k1 * sigma * (k0 / 8.0 + FORTY.of::<FUSED>(k1 * sigma))),
+                                + k1 * sigma * (k0 / 8.0 + FORTY.divide::<FUSED>(k1 * sigma))),
                     sigma2
-                        * (0.5 * k0 + SIX.of::<FUSED>(k1 * sigma)
-                            - TWENTY_FOUR.of::<FUSED>(self.cube[l] * sigma2)),
+                        * (0.5 * k0 + SIX.divide::<FUSED>(k1 * sigma)
+                            - TWENTY_FOUR.divide::<FUSED>(self.cube[l] * sigma2)),
                     k0 + k1 * sigma,
                 ),
             };
@@ -228,7 +228,7 @@ impl<const N: usize> Tracked<N> {
                 STRAIGHT => (1.0, 0.0),
                 _ => (
                     1.0 - 0.5 * theta * theta,
-                    theta - SIX.of::<FUSED>(theta * theta * theta),
+                    theta - SIX.divide::<FUSED>(theta * theta * theta),
                 ),
             };
             let (ahead, left_of) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);

@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use super::divide::{SIX, TWENTY_FOUR};
+use super::nonlinear::{Acting, NonlinearVehicles};
 use super::points::Points;
-use super::real::{Acting, Reals};
 use super::tracked::{ALL, Tracked};
 use super::{ALIVE, ARM, Aligned, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use haptic_sim::models::STEP_S;
@@ -36,7 +36,7 @@ pub(super) struct Worlds<const N: usize> {
     pub(super) driver: Points<N>,
     pub(super) camera: Points<N>,
     pub(super) body: Tracked<N>,
-    pub(super) real: Reals<N>,
+    pub(super) nonlinear: NonlinearVehicles<N>,
     pub(super) remnant_nm: [f64; N],
     /// [`ALIVE`] where a run is under way.
     pub(super) alive: [u64; N],
@@ -69,7 +69,7 @@ impl<const N: usize> Worlds<N> {
             driver: Points::new(),
             camera: Points::new(),
             body: Tracked::new(),
-            real: Reals::new(),
+            nonlinear: NonlinearVehicles::new(),
             remnant_nm: [0.0; N],
             alive: [0; N],
             suspect: [0; N],
@@ -128,7 +128,7 @@ impl<const N: usize> Worlds<N> {
             }
         }
         self.distance[lane] = transition.distance_m;
-        self.real.set_gains(lane, transition.gains());
+        self.nonlinear.set_gains(lane, transition.gains());
     }
 
     /// chi of each run, rad.
@@ -144,15 +144,15 @@ impl<const N: usize> Worlds<N> {
     /// The driver looks at the road; returns whether a run that is alive has come to its end.
     #[inline(always)]
     pub(super) fn driver_looks<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
-        let asked = self.alive;
+        let selected = self.alive;
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
         self.driver
-            .look::<FUSED>(roads, place, &chi, &asked, &mut self.suspect);
+            .observe::<FUSED>(roads, place, &chi, &selected, &mut self.suspect);
         let mut ended = 0;
         for l in 0..N {
             ended |= if self.driver.far.s()[l] >= self.end[l] {
-                asked[l]
+                selected[l]
             } else {
                 0
             };
@@ -165,13 +165,17 @@ impl<const N: usize> Worlds<N> {
         self.driver.far.s()[lane] >= self.end[lane]
     }
 
-    /// The camera looks at the road in the runs that are asked for.
+    /// The camera looks at the road in the runs that are selected.
     #[inline(always)]
-    pub(super) fn camera_looks<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N], asked: &[u64; N]) {
+    pub(super) fn camera_looks<const FUSED: bool>(
+        &mut self,
+        roads: &[Arc<Centreline>; N],
+        selected: &[u64; N],
+    ) {
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
         self.camera
-            .look::<FUSED>(roads, place, &chi, asked, &mut self.suspect);
+            .observe::<FUSED>(roads, place, &chi, selected, &mut self.suspect);
     }
 
     /// Where the centres of gravity are on their roads.
@@ -184,7 +188,7 @@ impl<const N: usize> Worlds<N> {
             let is_off = self.body.offset[l].abs() > DIVERGED_M;
             self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
         }
-        self.real.locate(roads, |lane| self.body.place(lane));
+        self.nonlinear.locate(roads, |lane| self.body.place(lane));
     }
 
     /// The drivers' eyes and arms, columns and vehicles move for a millisecond, from one speed to the next.
@@ -213,15 +217,16 @@ impl<const N: usize> Worlds<N> {
             remnant_nm: &self.remnant_nm,
             alive: &self.alive,
         };
-        self.real.step(&self.state, &acting, next, &mut self.distance);
+        self.nonlinear
+            .step(&self.state, &acting, next, &mut self.distance);
         (self.state, self.target) = places.0;
         for l in 0..N {
             let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);
             let square = half_turn * half_turn;
             self.suspect[l] |= if square < 1e-6 { 0 } else { ALIVE };
             let (sin, cos) = (
-                half_turn * (1.0 - SIX.of::<FUSED>(square)),
-                1.0 - square * (0.5 - TWENTY_FOUR.of::<FUSED>(square)),
+                half_turn * (1.0 - SIX.divide::<FUSED>(square)),
+                1.0 - square * (0.5 - TWENTY_FOUR.divide::<FUSED>(square)),
             );
             let [x, y] = rotated([self.direction[0][l], self.direction[1][l]], sin, cos);
             self.x[l] += self.distance[l] * x;

@@ -1,6 +1,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, Optional, Union, final
+from typing import Any, Final, Literal, Optional, Union, final
 
 import numpy as np
 from typing_extensions import Required, TypedDict, Unpack
@@ -13,20 +13,20 @@ class SpeedTable(TypedDict, total=False):
     speed_m_per_s: Required[Sequence[float]]
 
 class SegmentTable(TypedDict, total=False):
-    length: Required[float]
-    curvature: float
-    curvature_start: float
-    curvature_end: float
-    bank: float
-    bank_start: float
-    bank_end: float
+    length_m: Required[float]
+    curvature_per_m: float
+    curvature_start_per_m: float
+    curvature_end_per_m: float
+    bank_rad: float
+    bank_start_rad: float
+    bank_end_rad: float
     grade: float
     grade_start: float
     grade_end: float
 
 class CourseTable(TypedDict, total=False):
     name: str
-    lane_width: float
+    lane_width_m: float
     segment: Sequence[SegmentTable]
     opendrive: str
 
@@ -173,30 +173,18 @@ class Scenario:
     def replace(self, **fields: Unpack[ScenarioFields]) -> Scenario: ...
     def to_dict(self) -> dict[str, Any]: ...
     def to_toml(self) -> str: ...
-    @property
-    def speed_kmh(self) -> float: ...
-    @property
-    def speed_m_per_s(self) -> float: ...
-    @property
-    def condition(self) -> str: ...
-    @property
-    def k_d(self) -> float: ...
-    @property
-    def k_hg(self) -> float: ...
-    @property
-    def t_p_s(self) -> float: ...
-    @property
-    def failure_time_s(self) -> Optional[float]: ...
-    @property
-    def course_name(self) -> str: ...
-    @property
-    def course_length_m(self) -> float: ...
-    @property
-    def lane_width_m(self) -> float: ...
-    @property
-    def duration_s(self) -> float: ...
-    @property
-    def seed(self) -> int: ...
+    speed_kmh: Final[float]
+    speed_m_per_s: Final[float]
+    condition: Final[str]
+    k_d: Final[float]
+    k_hg: Final[float]
+    t_p_s: Final[float]
+    failure_time_s: Final[Optional[float]]
+    course_name: Final[str]
+    course_length_m: Final[float]
+    lane_width_m: Final[float]
+    duration_s: Final[float]
+    seed: Final[int]
 
 @final
 class Action:
@@ -213,103 +201,60 @@ class Action:
 @final
 class Frame:
     def __init__(self, id: int, data: Union[bytes, bytearray]) -> None: ...
-    @property
-    def id(self) -> int: ...
-    @property
-    def data(self) -> bytes: ...
+    id: Final[int]
+    data: Final[bytes]
     def __iter__(self) -> Iterator[Any]: ...
     def __hash__(self) -> int: ...
 
 @final
 class Outcome:
-    @property
-    def time_s(self) -> float: ...
-    @property
-    def e_y_m(self) -> float: ...
-    @property
-    def e_theta_rad(self) -> float: ...
-    @property
-    def driver_torque_nm(self) -> float: ...
-    @property
-    def wheel_angle_rad(self) -> float: ...
-    @property
-    def decided_torque_nm(self) -> float: ...
-    @property
-    def guidance_torque_nm(self) -> float: ...
-    @property
-    def guidance_limited(self) -> bool: ...
-    @property
-    def mode(self) -> Optional[str]: ...
-    @property
-    def faults(self) -> tuple[str, ...]: ...
-    @property
-    def warning(self) -> bool: ...
-    @property
-    def k_hg(self) -> Optional[tuple[float, float]]: ...
-    @property
-    def unguided(self) -> Optional[str]: ...
-    @property
-    def sample(self) -> Optional[dict[str, float]]: ...
-    @property
-    def frames_in(self) -> list[Frame]: ...
-    @property
-    def frames_out(self) -> list[Frame]: ...
+    time_s: Final[float]
+    e_y_m: Final[float]
+    e_theta_rad: Final[float]
+    driver_torque_nm: Final[float]
+    wheel_angle_rad: Final[float]
+    decided_torque_nm: Final[float]
+    guidance_torque_nm: Final[float]
+    guidance_limited: Final[bool]
+    mode: Final[Optional[str]]
+    faults: Final[tuple[str, ...]]
+    warning: Final[bool]
+    k_hg: Final[Optional[tuple[float, float]]]
+    unguided: Final[Optional[str]]
+    sample: Final[Optional[dict[str, float]]]
+    frames_in: Final[list[Frame]]
+    frames_out: Final[list[Frame]]
 
 @final
 class DriverView:
-    @property
-    def step(self) -> int: ...
-    @property
-    def time_s(self) -> float: ...
-    @property
-    def e_y_m(self) -> float: ...
-    @property
-    def e_theta_rad(self) -> float: ...
-    @property
-    def near_m(self) -> float: ...
-    @property
-    def far_m(self) -> float: ...
-    @property
-    def wheel_angle_rad(self) -> float: ...
-    @property
-    def wheel_rate_rad_per_s(self) -> float: ...
-    @property
-    def speed_m_per_s(self) -> float: ...
-    @property
-    def yaw_rate_rad_per_s(self) -> float: ...
-    @property
-    def guidance_torque_nm(self) -> float: ...
-    @property
-    def warning(self) -> bool: ...
-    @property
-    def asks_for_hands(self) -> bool: ...
+    step: Final[int]
+    time_s: Final[float]
+    e_y_m: Final[float]
+    e_theta_rad: Final[float]
+    near_m: Final[float]
+    far_m: Final[float]
+    wheel_angle_rad: Final[float]
+    wheel_rate_rad_per_s: Final[float]
+    speed_m_per_s: Final[float]
+    yaw_rate_rad_per_s: Final[float]
+    guidance_torque_nm: Final[float]
+    warning: Final[bool]
+    asks_for_hands: Final[bool]
 
 @final
 class LawView:
-    @property
-    def step(self) -> int: ...
-    @property
-    def e_y_m(self) -> float: ...
-    @property
-    def e_y_rate_m_per_s(self) -> float: ...
-    @property
-    def e_theta_rad(self) -> float: ...
-    @property
-    def e_theta_rate_rad_per_s(self) -> float: ...
-    @property
-    def driver_torque_nm(self) -> float: ...
-    @property
-    def wheel_angle_rad(self) -> float: ...
-    @property
-    def wheel_rate_rad_per_s(self) -> float: ...
-    @property
-    def guidance_torque_nm(self) -> float: ...
-    @property
-    def speed_m_per_s(self) -> float: ...
-    @property
-    def yaw_rate_rad_per_s(self) -> float: ...
-    @property
-    def k_hg(self) -> Optional[float]: ...
+    step: Final[int]
+    e_y_m: Final[float]
+    e_y_rate_m_per_s: Final[float]
+    e_theta_rad: Final[float]
+    e_theta_rate_rad_per_s: Final[float]
+    driver_torque_nm: Final[float]
+    wheel_angle_rad: Final[float]
+    wheel_rate_rad_per_s: Final[float]
+    guidance_torque_nm: Final[float]
+    speed_m_per_s: Final[float]
+    yaw_rate_rad_per_s: Final[float]
+    k_hg: Final[Optional[float]]
 
 @final
 class Simulation:
@@ -317,29 +262,19 @@ class Simulation:
     def view(self) -> Optional[DriverView]: ...
     def step(self, action: Optional[Action] = None, steps: int = 1) -> Optional[Outcome]: ...
     def clone(self) -> Simulation: ...
-    @property
-    def steps(self) -> int: ...
-    @property
-    def ending(self) -> Optional[Literal["course-end", "diverged"]]: ...
-    @property
-    def scenario(self) -> Scenario: ...
+    steps: Final[int]
+    ending: Final[Optional[Literal["course-end", "diverged"]]]
+    scenario: Final[Scenario]
 
 @final
 class Step:
-    @property
-    def torque_nm(self) -> float: ...
-    @property
-    def mode(self) -> str: ...
-    @property
-    def limit(self) -> str: ...
-    @property
-    def faults(self) -> tuple[str, ...]: ...
-    @property
-    def warning(self) -> bool: ...
-    @property
-    def permitted(self) -> bool: ...
-    @property
-    def frames(self) -> list[Frame]: ...
+    torque_nm: Final[float]
+    mode: Final[str]
+    limit: Final[str]
+    faults: Final[tuple[str, ...]]
+    warning: Final[bool]
+    permitted: Final[bool]
+    frames: Final[list[Frame]]
 
 @final
 class Ecu:
@@ -422,12 +357,9 @@ class Sweep:
     def load(path: Union[str, PathLike[str]]) -> Sweep: ...
     @staticmethod
     def from_text(text: str) -> Sweep: ...
-    @property
-    def text(self) -> str: ...
-    @property
-    def drives(self) -> int: ...
-    @property
-    def chunks(self) -> int: ...
+    text: Final[str]
+    drives: Final[int]
+    chunks: Final[int]
     def missing(self, out: Union[str, PathLike[str]]) -> list[int]: ...
     def run_chunk(self, number: int) -> bytes: ...
     def stop(self) -> None: ...

@@ -92,7 +92,8 @@ class _Loops:
         self.weights = np.array(self.weights_of_one)
         self.off_road = float(weights["off_road"])
         if most is not None:
-            self.low, self.high = -most, most
+            check_range("most_torque_nm", most, 0.1, 50.0, "N.m")
+            self.low, self.high = -float(most), float(most)
         self.action_space = Box(self.low, self.high, (1,), np.float32)
         self.observation_space = Box(-_HIGH, _HIGH, dtype=np.float32)
         self.slack: Optional[Scenario] = None
@@ -288,8 +289,7 @@ class DriverEnv(_Env):
         reward: Optional[Mapping[str, float]] = None,
         most_torque_nm: float = 10.0,
     ) -> None:
-        check_range("most_torque_nm", most_torque_nm, 0.1, 50.0, "N.m")
-        self._set(_Driver(1, scenario, period_ms, reward, float(most_torque_nm)))
+        self._set(_Driver(1, scenario, period_ms, reward, most_torque_nm))
 
 
 class AuthorityEnv(_Env):
@@ -330,8 +330,7 @@ class DriverVectorEnv(_VectorEnv):
         reward: Optional[Mapping[str, float]] = None,
         most_torque_nm: float = 10.0,
     ) -> None:
-        check_range("most_torque_nm", most_torque_nm, 0.1, 50.0, "N.m")
-        self._set(_Driver(num_envs, scenario, period_ms, reward, float(most_torque_nm)))
+        self._set(_Driver(num_envs, scenario, period_ms, reward, most_torque_nm))
 
 
 class AuthorityVectorEnv(_VectorEnv):

@@ -1,4 +1,4 @@
-//! What the ECU hears.
+//! The messages that the ECU receives.
 
 use super::{Info, Message, from_lsb, info, is_within, narrow, put, to_bits, to_lsb, unsigned};
 use fixed::types::{I16F16, I24F40, I64F0};
@@ -13,8 +13,9 @@ pub struct LanePreview {
     pub e_y: Metres,
     /// e_theta' at the far point, +-0.5 rad, LSB 2^-16 rad.
     pub e_theta: Radians,
-    /// Age of the sample when the frame was sent, 0 to 204.7 ms, LSB 0.1 ms. In two signals: what is less than 51.2 ms, which
-    /// is all that senders of version 2.1 and before know, and how often 51.2 ms come to that.
+    /// Age of the sample when the frame was sent, 0 to 204.7 ms, LSB 0.1 ms. It is carried in two signals: the
+    /// remainder below 51.2 ms, the only one that senders of version 2.1 and older have, and the number of whole 51.2
+    /// ms.
     pub age: Micros,
     /// Whether the sender vouches for the errors.
     pub valid: bool,
@@ -72,7 +73,7 @@ pub struct Column {
     pub driver_torque: Torque,
     /// phi, +-720 deg, LSB 0.01 deg.
     pub wheel_angle: Radians,
-    /// The torque that the motor delivers, +-7.9 N.m, LSB 2^-12 N.m: what checks the actuator.
+    /// The torque that the motor delivers, +-7.9 N.m, LSB 2^-12 N.m. The actuator is checked with it.
     pub motor_torque: Torque,
 }
 
@@ -80,7 +81,7 @@ impl Column {
     const TORQUE_LSB: u32 = 12;
     /// +-20 N.m: no driver turns a wheel harder by hand.
     const DRIVER_MAX: i64 = 20 << Self::TORQUE_LSB;
-    /// Beyond any guidance torque, so that a motor that delivers too much can say so.
+    /// The range is wider than that of the guidance torque, so that a motor that delivers too much can be reported.
     const MOTOR_MAX: i64 = (1 << 15) - 1;
     /// +-720 deg: two turns, lock to lock.
     const ANGLE_MAX: i64 = 72_000;
@@ -137,10 +138,10 @@ pub struct Vehicle {
 
 impl Vehicle {
     const LSB: u32 = 8;
-    /// 324 km/h.
+    /// 90 m/s are 324 km/h.
     const MAX: i64 = 90 << Self::LSB;
     const YAW_RATE_LSB: u32 = 12;
-    /// 114 deg/s: beyond what a sensor of a car measures.
+    /// 114 deg/s, more than a car's yaw rate sensor measures.
     const YAW_RATE_MAX: i64 = (1 << 13) - 1;
 }
 
@@ -160,7 +161,7 @@ impl Message for Vehicle {
     fn unpack(data: &[u8; 8]) -> Option<Self> {
         let word = u64::from_le_bytes(*data);
         let raw = [narrow(word, 12, 16), narrow(word, 28, 16)];
-        // Guidance backwards makes no sense: a negative speed is a sender's fault.
+        // Guidance is for driving forwards: a negative speed is the sender's fault.
         let in_range = raw.iter().all(|v| (0..=Self::MAX).contains(&i64::from(*v)));
         let is_valid = unsigned(word, 58, 1) != 0;
         let yaw_rate = if is_valid { narrow(word, 44, 14) } else { 0 };
@@ -171,7 +172,7 @@ impl Message for Vehicle {
     }
 }
 
-/// LSB of the authority, 2^-7, and what all of the law's torque is in it.
+/// LSB of the authority, 2^-7, and the raw value of an authority of 1.
 const AUTHORITY_LSB: u32 = 7;
 const AUTHORITY_MAX: i64 = 1 << AUTHORITY_LSB;
 

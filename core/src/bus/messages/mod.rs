@@ -1,9 +1,10 @@
 //! What each frame means. Positions, LSBs and ranges stand here and in `core/haptic.dbc`; `tests/dbc.rs` holds
 //! the two together.
 //!
-//! Layout: little-endian (Intel) bit order; bits 0..7 CRC, bits 8..11 counter, signals from bit 12. A message of eight bytes
-//! packs its signals into one 64-bit word, a longer one writes them with [`put_field`] and reads them with [`field`]. LSBs are powers of two in SI units, so that a raw value crosses into fixed point without a
-//! rounding; only the wheel angle, which sensors give in degrees, is multiplied.
+//! Layout: little-endian (Intel) bit order; bits 0..7 CRC, bits 8..11 counter, signals from bit 12. A message of
+//! eight bytes packs its signals into one 64-bit word, a longer one writes them with [`put_field`] and reads them
+//! with [`field`]. LSBs are powers of two in SI units, so that raw values become fixed point without rounding; only
+//! the wheel angle, which sensors give in degrees, is multiplied.
 
 mod inputs;
 mod outputs;
@@ -48,11 +49,12 @@ pub struct Info {
     pub id: u16,
     /// CRC and counter.
     pub protection: Protection,
-    /// Largest step of the counter that lost frames explain within [`TIMEOUT`].
+    /// Largest step of the counter that lost frames within [`TIMEOUT`] explain.
     pub max_delta: u8,
     /// Who sends it.
     pub sender: Sender,
-    /// Shortest time between two frames, ms; where it is none, the shortest that the bus load is reckoned with.
+    /// Shortest time between two frames, ms. For a message without a fixed period it is the shortest that the bus
+    /// load is computed with.
     pub period_ms: f64,
 }
 
@@ -109,7 +111,7 @@ messages! {
     0x350 Identity, 0xDD, 2, Ecu, 1000.0;
 }
 
-/// Whether the ECU hears what comes under an identifier: a message of the list, of another sender.
+/// Whether the ECU receives an identifier: that of a message of the list from another sender.
 #[must_use]
 pub const fn is_input(id: u16) -> bool {
     matches!(
@@ -164,7 +166,8 @@ pub trait Message<const N: usize = 8>: Copy {
     ) -> Result<Self, Reject> {
         let data = frame.payload::<N>().ok_or(Reject::Length)?;
         let signals = Self::unpack(data);
-        // Nobody is trusted for a frame out of range; the gap that it leaves begins the count of clean ones anew.
+        // A frame out of range does not make a sender trusted; the gap that it leaves in the counter restarts the
+        // count of clean frames.
         if signals.is_some() || state.is_trusted() {
             state.accept(&Self::PROTECTION, data, max_delta)?;
         }
@@ -172,7 +175,7 @@ pub trait Message<const N: usize = 8>: Copy {
     }
 }
 
-/// Every safety message is stale at this age.
+/// At this age every safety message is out of date.
 pub const TIMEOUT: Micros = Micros::from_ms(30);
 
 /// Writes a signal of at most 57 bits into a payload of any length: `value` from bit `start` on, in place of what was there.

@@ -1,4 +1,4 @@
-//! What the ECU says.
+//! The messages that the ECU sends.
 
 #![expect(
     clippy::as_conversions,
@@ -18,7 +18,7 @@ use crate::safety::modes::Mode;
 #[repr(u8)]
 #[non_exhaustive]
 pub enum ResetCause {
-    /// Power came.
+    /// The power was switched on.
     #[default]
     PowerOn = 0,
     /// The watchdog was not fed.
@@ -61,9 +61,9 @@ pub struct Guidance {
     pub limit: LimitReason,
     /// The mode.
     pub mode: Mode,
-    /// The driver has to take over.
+    /// Whether the driver has to take over.
     pub warning: bool,
-    /// What is wrong, one bit each. This frame has room for the first [`Guidance::FAULTS`] of the fault word.
+    /// The faults present, one bit each. The frame has room for the first [`Guidance::FAULTS`] of the fault word.
     pub faults: FaultSet,
     /// Why the ECU last started.
     pub reset: ResetCause,
@@ -81,7 +81,7 @@ pub struct Classes {
 }
 
 impl Guidance {
-    /// So many faults of the word have a bit of their own here; the rest is in [`Warning`] and [`FaultRecord`].
+    /// How many faults of the fault word have a bit in this frame; the others are in [`Warning`] and [`FaultRecord`].
     pub const FAULTS: u32 = 21;
 
     /// The classes that a guidance frame names.
@@ -99,8 +99,8 @@ impl Guidance {
     /// +-5 N.m, the widest profile of the envelope.
     const TORQUE_MAX: i64 = 5 << Self::TORQUE_LSB;
 
-    /// A torque as this message carries it, less than one LSB away. Rounded toward zero, so that no upper bound
-    /// that held before is crossed by rounding; the envelope's bound on the reduction leaves room for it.
+    /// The torque that this message carries for a torque, less than one LSB away. It is rounded toward zero, so that
+    /// rounding crosses no upper bound; the envelope's bound on the reduction leaves room for it.
     #[must_use]
     pub fn rounded(torque: Torque) -> Torque {
         const LSB: i64 = 1 << (24 - Guidance::TORQUE_LSB);
@@ -143,10 +143,11 @@ impl Message for Guidance {
     }
 }
 
-/// The driver has to take over: in the same step as the reaction, then every 100 ms while it holds.
+/// The driver has to take over. The message is sent in the step of the reaction, and then every 100 ms for as long as
+/// the warning lasts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Warning {
-    /// The mode that made it necessary.
+    /// The mode that made the warning necessary.
     pub mode: Mode,
     /// Why.
     pub faults: FaultSet,
@@ -169,7 +170,7 @@ impl Message for Warning {
     }
 }
 
-/// One line of the fault history, the next every 100 ms, for as long as there is one.
+/// One line of the fault history. Each 100 ms the next line is sent, if the history has any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaultRecord {
     /// Which line.
@@ -208,7 +209,7 @@ impl Message for FaultRecord {
     }
 }
 
-/// The probe and what it tells, every 20 ms.
+/// The probe and the estimate of K_hg that follows from it, every 20 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Telemetry {
     /// The part of the guidance torque that is the probe, +-0.4995 N.m, LSB 2^-12 N.m, while there is one.

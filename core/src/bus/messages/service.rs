@@ -19,32 +19,28 @@ pub struct ParameterWrite {
     pub value: f32,
 }
 
-impl Message for ParameterWrite {
-    const INFO: Info = info::ParameterWrite;
-
-    fn pack(&self, data: &mut [u8; 8]) {
-        let word = pack_parameter(self.index, self.value);
-        *data = word.to_le_bytes();
-    }
-
-    fn unpack(data: &[u8; 8]) -> Option<Self> {
-        let word = u64::from_le_bytes(*data);
-        let (index, value) = unpack_parameter(word)?;
-        Some(Self { index, value })
-    }
-}
-
 /// A parameter lies the same way in both directions.
-fn pack_parameter(index: u8, value: f32) -> u64 {
-    put(i64::from(index), 12, 8) | put(i64::from(value.to_bits()), 32, 32)
-}
+macro_rules! carry_a_parameter {
+    ($($name:ident)*) => {$(
+        impl Message for $name {
+            const INFO: Info = info::$name;
 
-/// `None`: there is no such parameter.
-fn unpack_parameter(word: u64) -> Option<(u8, f32)> {
-    let index = unsigned(word, 12, 8) as u8;
-    let value = f32::from_bits(unsigned(word, 32, 32) as u32);
-    (usize::from(index) < PARAMETERS.len()).then_some((index, value))
+            fn pack(&self, data: &mut [u8; 8]) {
+                let word = put(i64::from(self.index), 12, 8) | put(i64::from(self.value.to_bits()), 32, 32);
+                *data = word.to_le_bytes();
+            }
+
+            fn unpack(data: &[u8; 8]) -> Option<Self> {
+                let word = u64::from_le_bytes(*data);
+                let index = unsigned(word, 12, 8) as u8;
+                let value = f32::from_bits(unsigned(word, 32, 32) as u32);
+                // There are no others.
+                (usize::from(index) < PARAMETERS.len()).then_some(Self { index, value })
+            }
+        }
+    )*};
 }
+carry_a_parameter! { ParameterWrite ParameterValue }
 
 /// What has to come before a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,21 +75,6 @@ pub struct ParameterValue {
     pub index: u8,
     /// Its value, SI, rounded to a binary32.
     pub value: f32,
-}
-
-impl Message for ParameterValue {
-    const INFO: Info = info::ParameterValue;
-
-    fn pack(&self, data: &mut [u8; 8]) {
-        let word = pack_parameter(self.index, self.value);
-        *data = word.to_le_bytes();
-    }
-
-    fn unpack(data: &[u8; 8]) -> Option<Self> {
-        let word = u64::from_le_bytes(*data);
-        let (index, value) = unpack_parameter(word)?;
-        Some(Self { index, value })
-    }
 }
 
 /// How often a message was not used for a reason; the next pair that there is every 100 ms.

@@ -40,7 +40,7 @@ pub fn differences(first: &Identification, second: &Identification) -> Vec<Diffe
     let pairs = first.parameters.list().into_iter().zip(second.parameters.list());
     let mut found: Vec<Difference> = pairs
         .filter_map(|((parameter, unit, a), (_, _, b))| {
-            let ((a, a_error), (b, b_error)) = (told(a)?, told(b)?);
+            let ((a, a_error), (b, b_error)) = (value_and_error(a)?, value_and_error(b)?);
             let (difference, standard_error) = (a - b, a_error.hypot(b_error));
             let margin = STANDARD_NORMAL_95 * standard_error;
             Some(Difference {
@@ -75,7 +75,7 @@ fn holm(p: &[f64]) -> Vec<f64> {
 
 /// What a record tells of a parameter, however little: value and standard error. Nothing of one that was given, that lies on a
 /// bound of the search, or whose model is refuted.
-pub fn told(p: &Parameter) -> Option<(f64, f64)> {
+pub fn value_and_error(p: &Parameter) -> Option<(f64, f64)> {
     let value = p.estimate.or(p.optimum.filter(|_| !p.on_bound))?;
     let error = p.standard_error.filter(|&error| error > 0.0 && !p.fixed)?;
     Some((value, error))
@@ -113,9 +113,12 @@ pub fn population(found: &[&Identification]) -> Vec<Population> {
         .into_iter()
         .enumerate()
         .filter_map(|(i, (parameter, unit, _))| {
-            let all: Vec<Option<(f64, f64)>> = found.iter().map(|f| told(f.parameters.list()[i].2)).collect();
+            let all: Vec<Option<(f64, f64)>> = found
+                .iter()
+                .map(|f| value_and_error(f.parameters.list()[i].2))
+                .collect();
             let known: Vec<(f64, f64)> = all.iter().copied().flatten().collect();
-            let effects = RandomEffects::of(&known)?;
+            let effects = RandomEffects::from_values(&known)?;
             Some(Population {
                 parameter,
                 unit,
@@ -145,7 +148,7 @@ const FEWEST: usize = 3;
 const HALVINGS: usize = 200;
 
 impl RandomEffects {
-    fn of(values: &[(f64, f64)]) -> Option<Self> {
+    fn from_values(values: &[(f64, f64)]) -> Option<Self> {
         if values.len() < FEWEST {
             return None;
         }
@@ -256,10 +259,10 @@ mod tests {
             fixed: false,
             optimum: Some(0.5),
         };
-        assert_eq!(told(&p), Some((0.5, 0.2)));
-        assert_eq!(told(&Parameter { on_bound: true, ..p }), None);
+        assert_eq!(value_and_error(&p), Some((0.5, 0.2)));
+        assert_eq!(value_and_error(&Parameter { on_bound: true, ..p }), None);
         assert_eq!(
-            told(&Parameter {
+            value_and_error(&Parameter {
                 standard_error: None,
                 ..p
             }),
@@ -280,7 +283,7 @@ mod tests {
             0.5325, 0.0714,
         ];
         let values: Vec<(f64, f64)> = y.into_iter().zip(v.map(f64::sqrt)).collect();
-        let found = RandomEffects::of(&values).unwrap();
+        let found = RandomEffects::from_values(&values).unwrap();
         assert!((found.variance - 0.3132).abs() < 1e-3, "{found:?}");
         assert!((found.mean + 0.7145).abs() < 1e-3, "{found:?}");
         let [low, high] = found.variance_interval_95;
@@ -296,7 +299,7 @@ mod tests {
         let y = [28.0, 8.0, -3.0, 7.0, -1.0, 1.0, 18.0, 12.0];
         let s = [15.0, 10.0, 16.0, 11.0, 9.0, 11.0, 10.0, 18.0];
         let values: Vec<(f64, f64)> = y.into_iter().zip(s).collect();
-        let found = RandomEffects::of(&values).unwrap();
+        let found = RandomEffects::from_values(&values).unwrap();
         assert_eq!(found.variance, 0.0);
         assert!((found.mean - 7.69).abs() < 0.01, "{found:?}");
         assert!((found.shrunk(28.0, 15.0) - found.mean).abs() < 1e-12);

@@ -34,7 +34,7 @@ pub use balance::Balance;
 pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_recording_with};
 pub use change::{Change, Constancy};
 pub use diagnostics::{autocorrelation, fit_percent};
-pub use drivers::{Difference, Population, differences, population, told};
+pub use drivers::{Difference, Population, differences, population, value_and_error};
 pub use lane::LaneNoise;
 pub use log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 pub use noise_model::{

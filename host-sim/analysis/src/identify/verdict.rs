@@ -52,45 +52,49 @@ const SAME_SENSORS: &str = "the sensors are the same throughout";
 pub(crate) const SAME_DRIVER: &str = "the driver is the same throughout";
 
 /// What the balance of torques on the column refutes.
-#[expect(
-    clippy::too_many_lines,
-    reason = "one finding after the other, in the order of their precedence"
-)]
 pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
-    let mut out = Vec::new();
     if b.explained < BALANCE_SEEN {
-        return out;
+        return Vec::new();
     }
-    let sure = |value: f64, error: f64| value.abs() > CERTAIN * error;
-    let evidence = |what: String| {
-        format!(
-            "column and guidance explain {:.1} % of driver_torque_nm, but {what}",
-            100.0 * b.explained
-        )
+    let signs_and_scale = of_signs_and_scale(b).into_iter();
+    signs_and_scale.chain(of_instants(b)).collect()
+}
+
+/// Whether a value differs from zero beyond its error.
+fn is_sure(value: f64, error: f64) -> bool {
+    value.abs() > CERTAIN * error
+}
+
+fn balance_evidence(b: &Balance, what: &str) -> String {
+    format!(
+        "column and guidance explain {:.1} % of driver_torque_nm, but {what}",
+        100.0 * b.explained
+    )
+}
+
+/// A channel with a swapped sign or another scale; at most one, in the order of precedence.
+fn of_signs_and_scale(b: &Balance) -> Option<Refutation> {
+    let negative = b.stiffness[0] < 0.0 && is_sure(b.stiffness[0], b.stiffness[1]);
+    let sign = |cause: &str, cure: &str, what: String| Refutation {
+        assumption: SIGNS,
+        evidence: balance_evidence(b, &what),
+        cause: cause.to_owned(),
+        cure: cure.to_owned(),
     };
-    let negative = b.stiffness[0] < 0.0 && sure(b.stiffness[0], b.stiffness[1]);
-    let mut sign = |cause: &str, cure: &str, what: String| {
-        out.push(Refutation {
-            assumption: SIGNS,
-            evidence: evidence(what),
-            cause: cause.to_owned(),
-            cure: cure.to_owned(),
-        });
-    };
-    match b.scale {
-        Some([s, e]) if s < 0.0 && sure(s, e) && s < -SMALL_SCALE => {
+    Some(match b.scale {
+        Some([s, e]) if s < 0.0 && is_sure(s, e) && s < -SMALL_SCALE => {
             if negative {
                 sign(
                     "the sign of driver_torque_nm is swapped",
                     "multiply driver_torque_nm by -1 in the log",
                     format!("with a scale of {s:.3} and a negative stiffness"),
-                );
+                )
             } else {
                 sign(
                     "the sign of guidance_torque_nm is swapped",
                     "multiply guidance_torque_nm by -1 in the log",
                     format!("with a scale of {s:.3} to guidance_torque_nm"),
-                );
+                )
             }
         }
         _ if negative => sign(
@@ -98,42 +102,50 @@ pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
             "multiply wheel_angle_rad (or driver_torque_nm) by -1 in the log",
             format!("with a stiffness of {:.2} N.m/rad", b.stiffness[0]),
         ),
-        Some([s, e]) if sure(1.0 - s, e) && s.abs() < SMALL_SCALE => out.push(Refutation {
+        Some([s, e]) if is_sure(1.0 - s, e) && s.abs() < SMALL_SCALE => Refutation {
             assumption: "driver_torque_nm is the driver's torque alone",
-            evidence: evidence(format!("guidance_torque_nm has no part in it: scale {s:.3} for 1")),
+            evidence: balance_evidence(
+                b,
+                &format!("guidance_torque_nm has no part in it: scale {s:.3} for 1"),
+            ),
             cause: "driver_torque_nm is the sum T_d + T_h (a sensor below the actuator)".to_owned(),
             cure: "subtract guidance_torque_nm from driver_torque_nm before".to_owned(),
-        }),
-        Some([s, e]) if sure(s - 1.0, e) && (s - 1.0).abs() > SMALL_SCALE => out.push(Refutation {
+        },
+        Some([s, e]) if is_sure(s - 1.0, e) && (s - 1.0).abs() > SMALL_SCALE => Refutation {
             assumption: "driver_torque_nm and guidance_torque_nm have one scale",
-            evidence: evidence(format!("at {s:.3} +- {e:.3} times its scale")),
+            evidence: balance_evidence(b, &format!("at {s:.3} +- {e:.3} times its scale")),
             cause: format!(
                 "driver_torque_nm is recorded at {s:.3} times its value (or guidance_torque_nm at {:.3} times)",
                 1.0 / s
             ),
             cure: format!("multiply driver_torque_nm by {:.3} in the log", 1.0 / s),
-        }),
-        _ => {}
-    }
+        },
+        _ => return None,
+    })
+}
+
+/// Columns that were not sampled at the same instant.
+fn of_instants(b: &Balance) -> Vec<Refutation> {
+    let mut out = Vec::new();
     let mut late = |name: &str, than: &str, option: &str, [value, error]: [f64; 2]| {
         let (size, word) = (1e3 * value.abs(), if value > 0.0 { "late" } else { "early" });
         out.push(Refutation {
             assumption: "all columns were sampled at the same instant",
-            evidence: evidence(format!(
-                "{name} {size:.1} +- {:.1} ms {word} against {than}",
-                1e3 * error
-            )),
+            evidence: balance_evidence(
+                b,
+                &format!("{name} {size:.1} +- {:.1} ms {word} against {than}", 1e3 * error),
+            ),
             cause: format!("{name} is {size:.0} ms {word}"),
             cure: format!("--fix {option}={value:.4}, or --estimate {option}"),
         });
     };
     let [driver, error] = b.driver_late_s;
-    let driver_is = sure(driver, error) && driver.abs() > SMALL_DRIVER_DELAY_S;
+    let driver_is = is_sure(driver, error) && driver.abs() > SMALL_DRIVER_DELAY_S;
     if driver_is {
         late("driver_torque_nm", "wheel_angle_rad", "t_d_late", b.driver_late_s);
     }
     if let Some([value, error]) = b.between_s.filter(|_| !driver_is)
-        && sure(value, error)
+        && is_sure(value, error)
         && value.abs() > SMALL_DELAY_S
     {
         // A sensor is never early: of the two, the other one is late.

@@ -1,7 +1,5 @@
 //! The file of a study of two adaptations, checked before anything is driven.
 
-use std::path::Path;
-
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::laws::Law as _;
 use haptic_sim::models::road::Course;
@@ -10,18 +8,19 @@ use serde::Deserialize;
 use toml::Table;
 
 use super::{Adaptation, Times};
-use crate::compare::{Kinds, Source, drives, parts};
+use crate::compare::{Kinds, drives, parts};
+use crate::files::{Source, one};
 use crate::study::check_names;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     name: String,
-    #[serde(default = "one")]
-    seed: u64,
-    seeds: u64,
     road: String,
     speed_m_per_s: f64,
+    seeds: u64,
+    #[serde(default = "one")]
+    seed: u64,
     #[serde(default)]
     scenario: Table,
     map: MapFile,
@@ -46,32 +45,17 @@ struct LossFile {
     lasts_s: f64,
 }
 
-fn one() -> u64 {
-    1
-}
-
-pub(super) fn load<'k>(path: &Path, kinds: &'k Kinds) -> Result<Adaptation<'k>, InputError> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
-    from_text(&name, &text, path.parent().unwrap_or(Path::new("")), kinds)
-}
-
 pub(super) fn from_text<'k>(
-    name: &str,
+    source: &Source,
     text: &str,
-    folder: &Path,
     kinds: &'k Kinds,
 ) -> Result<Adaptation<'k>, InputError> {
-    let source = Source {
-        name: name.into(),
-        folder,
-    };
-    let file: File = parse_toml(name, text)?;
+    let file: File = parse_toml(&source.name, text)?;
     check_names("study", [&file.name]).map_err(|e| source.bad(e))?;
-    let laws = parts(&source, "law", &file.law, &kinds.laws)?;
-    let drivers = parts(&source, "driver", &file.driver, &kinds.drivers)?;
-    rising(&source, "map.k_1", &file.map.k_1, [0.0, 4.0])?;
-    rising(&source, "map.k_hg", &file.map.k_hg, [0.0, 1.0])?;
+    rising(source, "map.k_1", &file.map.k_1, [0.0, 4.0])?;
+    rising(source, "map.k_hg", &file.map.k_hg, [0.0, 1.0])?;
+    let laws = parts(source, "law", &file.law, &kinds.laws)?;
+    let drivers = parts(source, "driver", &file.driver, &kinds.drivers)?;
     let times = Times {
         lost_at_s: file.loss.at_s,
         lost_for_s: file.loss.lasts_s,
@@ -88,9 +72,9 @@ pub(super) fn from_text<'k>(
         source.within(field, value, least, 3000.0, "s")?;
     }
     let (roads, speeds) = ([file.road], [file.speed_m_per_s]);
-    let mut made = drives(&source, "", &file.scenario, &roads, &speeds, file.seeds)?;
+    let mut made = drives(source, "", &file.scenario, &roads, &speeds, file.seeds)?;
     let (road, speed_kmh, scenario) = made.places.remove(0);
-    let scenario = laid_end_to_end(&source, &scenario, times.loop_s())?;
+    let scenario = laid_end_to_end(source, &scenario, times.loop_s())?;
     for law in &laws {
         let found = law.make(&scenario, &law.untuned()).map(|law| law.k_1());
         match found {
@@ -108,7 +92,7 @@ pub(super) fn from_text<'k>(
         found.map_err(|e| source.bad(format!("driver {}: {e}", driver.name)))?;
     }
     let paper = [Table::from_iter([("kind".into(), "paper".into())])];
-    let fixed = parts(&source, "law", &paper, &kinds.laws)?.remove(0);
+    let fixed = parts(source, "law", &paper, &kinds.laws)?.remove(0);
     Ok(Adaptation {
         name: file.name,
         seed: file.seed,

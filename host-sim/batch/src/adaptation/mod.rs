@@ -30,6 +30,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::compare::{Chosen, Kinds, Mean};
+use crate::files::Source;
 use crate::study::interval_of_mean;
 use drive::{Job, Seen};
 pub use linear::{Swing, of_series, steepest, swings};
@@ -179,7 +180,8 @@ impl<'k> Adaptation<'k> {
     /// # Errors
     /// The file, the field, its value and its range.
     pub fn load(path: &Path, kinds: &'k Kinds) -> Result<Self, InputError> {
-        file::load(path, kinds)
+        let (source, text) = Source::open(path)?;
+        file::from_text(&source, &text, kinds)
     }
 
     /// Drives in all.

@@ -9,6 +9,8 @@ use haptic_sim::{Action, Simulation};
 
 use super::*;
 use crate::compare::{on_threads, seed_of};
+use crate::files::Source;
+use crate::files::tests::check_refusals;
 
 /// Equal lags share the phase: three of T swing at a product of 8 with a period of 2*pi*T/sqrt(3), four at 4 with 2*pi*T. One lag never
 /// swings; a delay D alone does at 1 with 2*D.
@@ -106,36 +108,13 @@ fn a_driver_with_two_equilibria_has_no_slope_there() {
     assert_eq!(driver_slope(&map, [0.2, 0.45]), None);
 }
 
-const ROAD: &str = "[[segment]]\nlength = 100\n[[segment]]\nlength = 150\ncurvature = 0.002\n[[segment]]\nlength = 150\ncurvature = -0.002\n";
-const FILE: &str = "
-name = 'short'
-seeds = 2
-road = 'road.toml'
-speed_m_per_s = 16.666666666666668
-[scenario]
-driver = { remnant_sd_nm = 0.1 }
-guidance = { probe = true }
-[map]
-k_1 = [0.25, 0.45]
-k_hg = [0.1, 0.6]
-settles_s = 10
-averages_s = 20
-[loss]
-at_s = 40
-lasts_s = 2
-[[law]]
-kind = 'paper'
-[[law]]
-kind = 'by_reliance'
-[[driver]]
-kind = 'paper'
-around = [{ kind = 'trust', tau_s = 5 }]
-";
+const ROAD: &str = "[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 150\ncurvature_per_m = 0.002\n[[segment]]\nlength_m = 150\ncurvature_per_m = -0.002\n";
+const FILE: &str = include_str!("short.toml");
 
 fn study<'k>(text: &str, kinds: &'k Kinds) -> Result<Adaptation<'k>, InputError> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("road.toml"), ROAD).unwrap();
-    file::from_text("study.toml", text, folder.path(), kinds)
+    file::from_text(&Source::new("study.toml", folder.path()), text, kinds)
 }
 
 /// The loop under the first law, driven by itself by other means: K_hg before the loss and behind it, and at the first step of the loss,
@@ -263,10 +242,5 @@ const WRONG: [(&str, &str, &str); 10] = [
 #[test]
 fn a_wrong_file_is_refused_by_field_value_and_range() {
     let kinds = Kinds::default();
-    for (from, to, says) in WRONG {
-        let text = FILE.replacen(from, to, 1);
-        assert_ne!(text, FILE, "{from}");
-        let error = study(&text, &kinds).err().unwrap().to_string();
-        assert!(error.contains(says), "{to}: {error}");
-    }
+    check_refusals(FILE, &WRONG, |text| study(text, &kinds).err());
 }

@@ -1,4 +1,4 @@
-//! The drives of legs: with guidance and by hand, side by side where that can be.
+//! The drives of segments: with guidance and by hand, side by side where that can be.
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
@@ -15,11 +15,11 @@ use haptic_sim::{Action, Outcome, Scenario, Simulation};
 use haptic_vectorised::{Event, Options};
 
 use super::events::Eventful;
-use super::{ByHand, Declaration, LEG_S, Leg, LegNumber};
+use super::{ByHand, Declaration, DriveSegment, SEGMENT_S, SegmentNumber};
 use crate::error::StudyError;
 use crate::vectorised::{Checked, Group};
 
-const LEG_STEPS: u32 = (LEG_S * 1e3) as u32;
+const LEG_STEPS: u32 = (SEGMENT_S * 1e3) as u32;
 /// The driver asks for guidance again so long after it has left, ms.
 const AGAIN_MS: u32 = 5000;
 /// A request that was not granted is taken back for 100 ms in every second.
@@ -29,27 +29,30 @@ const LOW_MS: u32 = 100;
 /// In place of faults where the ECU named none.
 pub(crate) const UNNAMED: &str = "none named";
 
-/// Drives legs, side by side where that can be, both with guidance and by hand; `done` gets each with its place, in no order. A run
+/// Drives segments, side by side where that can be, both with guidance and by hand; `done` gets each with its place, in no order. A run
 /// that is vectorised with guidance is one in which the ECU leaves nothing.
 ///
 /// # Errors
-/// As [`LegNumber::scenario`]; a drive that differs from the shipping ECU's; what `done` says.
+/// As [`SegmentNumber::scenario`]; a drive that differs from the shipping ECU's; what `done` says.
 pub(super) fn side_by_side(
-    legs: &[LegNumber],
+    segments: &[SegmentNumber],
     root: u64,
     [first, of]: [usize; 2],
-    mut done: impl FnMut(usize, Leg) -> Result<(), StudyError>,
+    mut done: impl FnMut(usize, DriveSegment) -> Result<(), StudyError>,
 ) -> Result<(), StudyError> {
     // Vectorised runs know of nothing that happens.
-    if legs.iter().any(|leg| leg.world.happens() != Happens::default()) {
-        let mut alone = legs.iter().enumerate();
-        return alone.try_for_each(|(place, leg)| done(place, leg.drive(root)?));
+    if segments
+        .iter()
+        .any(|segment| segment.world.happens() != Happens::default())
+    {
+        let mut alone = segments.iter().enumerate();
+        return alone.try_for_each(|(place, segment)| done(place, segment.drive(root)?));
     }
-    let guided = legs.iter().map(|leg| leg.scenario(root));
+    let guided = segments.iter().map(|segment| segment.scenario(root));
     let guided: Vec<Scenario> = guided.collect::<Result<_, _>>()?;
     let manual: Vec<Scenario> = guided.iter().map(manual).collect::<Result<_, _>>()?;
     let options = Options {
-        most_s: Some(LEG_S as u32),
+        most_s: Some(SEGMENT_S as u32),
         ..Options::default()
     };
     let group = |scenarios| Group {
@@ -57,19 +60,19 @@ pub(super) fn side_by_side(
         first: first as u64,
         checked: Checked::new(root, of as u64),
     };
-    let mut hands: Vec<Option<ByHand>> = vec![None; legs.len()];
+    let mut hands: Vec<Option<ByHand>> = vec![None; segments.len()];
     let rejected = group(&manual).run_batch(
         options,
         |place| by_hand(&guided[place]),
         |place, event| {
             if let Event::Ended(run) = event {
-                hands[place] = Some(ByHand::of(run));
+                hands[place] = Some(ByHand::new(run));
             }
             Ok(())
         },
     )?;
     for place in rejected {
-        hands[place] = Some(ByHand::of(&by_hand(&guided[place])));
+        hands[place] = Some(ByHand::new(&by_hand(&guided[place])));
     }
     let hands: Vec<ByHand> = hands.into_iter().flatten().collect();
     let rejected = group(&guided).run_batch(
@@ -84,7 +87,7 @@ pub(super) fn side_by_side(
                 };
                 done(
                     place,
-                    legs[place].leg(&guided[place], run, reported, hands[place]),
+                    segments[place].segment(&guided[place], run, reported, hands[place]),
                 )
             }
             _ => Ok(()),
@@ -94,7 +97,7 @@ pub(super) fn side_by_side(
         let (run, reported) = with_ecu(&guided[place], Happens::default());
         done(
             place,
-            legs[place].leg(&guided[place], &run, reported, hands[place]),
+            segments[place].segment(&guided[place], &run, reported, hands[place]),
         )
     })
 }
@@ -109,10 +112,10 @@ fn manual(scenario: &Scenario) -> Result<Scenario, StudyError> {
     Ok(manual.build()?)
 }
 
-/// A leg's drive by hand.
+/// A segment's drive by hand.
 pub(super) fn by_hand(scenario: &Scenario) -> Run {
     let mut simulation = Simulation::with(scenario, NoGuidance);
-    let mut samples = room();
+    let mut samples = empty_samples();
     while simulation.steps() < LEG_STEPS {
         let Some(outcome) = simulation.step(&Action::default()) else {
             break;
@@ -122,11 +125,11 @@ pub(super) fn by_hand(scenario: &Scenario) -> Run {
     run_of(samples, simulation.ending(), simulation.steps())
 }
 
-/// A leg's drive with the shipping ECU, and what it reported.
+/// A segment's drive with the shipping ECU, and what it reported.
 pub(super) fn with_ecu(scenario: &Scenario, happens: Happens) -> (Run, Reported) {
     let ecu = Eventful::new(OverBus::new(scenario.setup()), happens, scenario.seed());
     let mut simulation = Simulation::with(scenario, ecu);
-    let (mut watch, mut samples) = (Watch::new(), room());
+    let (mut watch, mut samples) = (Watch::new(), empty_samples());
     while watch.steps < LEG_STEPS && watch.reported.mode != Mode::Fault {
         let action = Action {
             beside_m: simulation.guidance().beside_m(watch.steps),
@@ -141,9 +144,9 @@ pub(super) fn with_ecu(scenario: &Scenario, happens: Happens) -> (Run, Reported)
     (run_of(samples, simulation.ending(), watch.steps), watch.reported)
 }
 
-/// For the samples of a leg.
-fn room() -> Vec<Sample> {
-    Vec::with_capacity((LEG_S * f64::from(SAMPLE_RATE_HZ)) as usize + 1)
+/// For the samples of a segment.
+fn empty_samples() -> Vec<Sample> {
+    Vec::with_capacity((SEGMENT_S * f64::from(SAMPLE_RATE_HZ)) as usize + 1)
 }
 
 fn run_of(samples: Vec<Sample>, ending: Option<Ending>, steps: u32) -> Run {
@@ -157,7 +160,7 @@ fn run_of(samples: Vec<Sample>, ending: Option<Ending>, steps: u32) -> Run {
     }
 }
 
-/// Driver, host and listener of a leg.
+/// Driver, host and listener of a segment.
 pub(crate) struct Watch {
     receiver: ReceiverState,
     pub(crate) reported: Reported,
@@ -171,7 +174,7 @@ pub(crate) struct Watch {
     lateral_m_per_s2: f64,
 }
 
-/// What the ECU did in a leg.
+/// What the ECU did in a segment.
 pub(crate) struct Reported {
     /// At its end.
     pub(crate) mode: Mode,
@@ -221,11 +224,11 @@ impl Watch {
             let v = sample.speed_m_per_s;
             self.lateral_m_per_s2 = sample.curvature_1pm * v * v;
         }
-        self.hear(outcome.time_s(), outcome.frames_out.first());
+        self.take_frame(outcome.time_s(), outcome.frames_out.first());
     }
 
     /// Takes the guidance frame of a step.
-    pub(crate) fn hear(&mut self, time_s: f64, frame: Option<&Frame>) {
+    pub(crate) fn take_frame(&mut self, time_s: f64, frame: Option<&Frame>) {
         self.steps += 1;
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {

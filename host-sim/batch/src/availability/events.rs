@@ -1,4 +1,4 @@
-//! What happens to honest inputs on ordinary roads: between the world and the ECU, at instants that a leg's seed draws.
+//! What happens to honest inputs on ordinary roads: between the world and the ECU, at instants that a segment's seed draws.
 //!
 //! Rates are those of a car at 100 km/h; `docs/how-to/measure-availability.md` has their sources.
 
@@ -80,7 +80,7 @@ impl Eventful {
         }
     }
 
-    fn go_on(&mut self, step: u32) {
+    fn advance(&mut self, step: u32) {
         let Happens {
             blinks,
             slips,
@@ -147,7 +147,7 @@ impl Guidance for Eventful {
 
     fn step(&mut self, observation: &Observation) -> Actuation {
         let step = observation.step;
-        self.go_on(step);
+        self.advance(step);
         let mut seen = *observation;
         if let Some(lane) = &mut seen.lane {
             lane.e_y_m -= self.line_m(lane.e_y_m);

@@ -1,44 +1,44 @@
 //! How often the ECU hands over although nothing is wrong: many cars on many roads, for hours.
 //!
-//! A *leg* is five minutes of driving: a car of the population on a road of its own, with a driver who keeps the lane as
+//! A *segment* is five minutes of driving: a car of the population on a road of its own, with a driver who keeps the lane as
 //! people do. It begins engaged. After every handover the driver drives alone, and asks for guidance again 5 s later. A
-//! leg ends where the ECU latches a fault: only a standstill would end that. A *declaration* is what took guidance away; as
-//! nothing is wrong in any leg, each is a false one. A *world* says what is real (`haptic_sim::worlds`).
+//! segment ends where the ECU latches a fault: only a standstill would end that. A *declaration* is what took guidance away; as
+//! nothing is wrong in any segment, each is a false one. A *world* says what is real (`haptic_sim::worlds`).
 //!
 //! A driver who leaves the road with the same car by hand too is one whom no guidance keeps on it: what the ECU makes of a
-//! vehicle that leaves the road is no false declaration. So every leg is driven a second time without guidance, whatever
-//! the first time showed, and a leg that is *lost by hand* is counted apart, with its hours.
+//! vehicle that leaves the road is no false declaration. So every segment is driven a second time without guidance, whatever
+//! the first time showed, and a segment that is *lost by hand* is counted apart, with its hours.
 //!
 //! Legs of one number and road share course, driver, car and noise in every world, so that worlds can be
-//! compared. A leg depends on the seed and on its own number alone: in whatever order and in however many sittings legs
+//! compared. A segment depends on the seed and on its own number alone: in whatever order and in however many sittings segments
 //! are driven, the results are the same.
 //!
 //! Not here: what is missed. `haptic-campaign` injects faults into the same world.
 
 mod drive;
 mod events;
-mod leg;
 mod roads;
+mod segment;
 
 use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 pub(crate) use drive::{UNNAMED, Watch};
-pub use leg::{ByHand, Declaration, Ended, Leg, LegNumber};
 pub use roads::{ROADS, Road};
+pub use segment::{ByHand, Declaration, DriveSegment, Ended, SegmentNumber};
 
 use crate::error::StudyError;
 use crate::vectorised::in_groups;
 
-/// Length of a leg, s.
-pub const LEG_S: f64 = 300.0;
+/// Length of a segment, s.
+pub const SEGMENT_S: f64 = 300.0;
 /// Cars of the population.
 pub const CARS: u32 = 30;
 
 /// What to drive.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct AvailabilityPlan {
     /// By name; all if empty.
     pub worlds: Vec<&'static WorldKind>,
     /// Roads to drive on.
@@ -47,16 +47,16 @@ pub struct Plan {
     pub hours: f64,
     /// Root of all random numbers.
     pub seed: u64,
-    /// These legs in place of hours of them; none: the hours.
+    /// These segments in place of hours of them; none: the hours.
     pub only: Vec<u32>,
 }
 
-impl Plan {
-    /// Every leg, in order.
-    pub fn legs(&self) -> Vec<LegNumber> {
-        let legs = (self.hours * 3600.0 / LEG_S - 1e-9).ceil().max(1.0) as u32;
+impl AvailabilityPlan {
+    /// Every segment, in order.
+    pub fn segments(&self) -> Vec<SegmentNumber> {
+        let segments = (self.hours * 3600.0 / SEGMENT_S - 1e-9).ceil().max(1.0) as u32;
         let numbers = if self.only.is_empty() {
-            (0..legs).collect()
+            (0..segments).collect()
         } else {
             self.only.clone()
         };
@@ -66,19 +66,19 @@ impl Plan {
             .flat_map(|world| self.roads.iter().map(move |road| (*world, *road)));
         cells
             .flat_map(|(world, road)| {
-                let leg = move |number: &u32| LegNumber {
+                let segment = move |number: &u32| SegmentNumber {
                     world,
                     road,
                     number: *number,
                 };
-                numbers.iter().map(leg)
+                numbers.iter().map(segment)
             })
             .collect()
     }
 
-    /// Whether a leg on record is one of these.
-    fn has(&self, leg: &Leg) -> bool {
-        self.legs().iter().any(|number| leg.is(number))
+    /// Whether a segment on record is one of these.
+    fn has(&self, segment: &DriveSegment) -> bool {
+        self.segments().iter().any(|number| segment.is(number))
     }
 }
 
@@ -97,7 +97,7 @@ pub struct Rate {
 
 impl Rate {
     /// Of so many events of a Poisson process in so many hours.
-    pub fn of(count: u64, hours: f64) -> Self {
+    pub fn new(count: u64, hours: f64) -> Self {
         let quantile = |share: f64, degrees: u64| {
             let law = ChiSquared::new(degrees as f64).expect("positive");
             0.5 * quantile(&law, share)
@@ -162,7 +162,7 @@ pub struct Cell {
     pub diverged: usize,
     /// Legs in which it leaves the road by hand too: nothing above counts them.
     pub lost_by_hand: Lost,
-    /// Standard deviation of the lateral position (SDLP), m: mean over the legs.
+    /// Standard deviation of the lateral position (SDLP), m: mean over the segments.
     pub sdlp_m: f64,
     /// Largest lateral error, m.
     pub largest_error_m: f64,
@@ -172,7 +172,8 @@ pub struct Cell {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lost {
     /// How many.
-    pub legs: usize,
+    #[serde(rename = "legs")]
+    pub segments: usize,
     /// How long they were driven with guidance at hand, h.
     pub hours: f64,
     /// What the ECU declared in them.
@@ -200,7 +201,8 @@ pub struct Availability {
     /// Judged worlds, their roads together, if there are several.
     pub together: Vec<Cell>,
     /// Legs of judged worlds in which the ECU left, or the vehicle left the road, with guidance or by hand.
-    pub legs: Vec<Leg>,
+    #[serde(rename = "legs")]
+    pub segments: Vec<DriveSegment>,
 }
 
 impl Availability {
@@ -215,42 +217,42 @@ impl Availability {
     }
 }
 
-/// Drives every leg of the plan that is not yet on record, on every core. `done` gets each new leg, from any thread.
+/// Drives every segment of the plan that is not yet on record, on every core. `done` gets each new segment, from any thread.
 ///
 /// # Errors
 /// A world that is no scenario, the built-in ones are; what `done` says; a drive that differs from the shipping ECU's.
 pub fn study(
-    plan: &Plan,
-    on_record: &[Leg],
-    done: impl Fn(&Leg) -> Result<(), StudyError> + Sync,
+    plan: &AvailabilityPlan,
+    on_record: &[DriveSegment],
+    done: impl Fn(&DriveSegment) -> Result<(), StudyError> + Sync,
 ) -> Result<Availability, StudyError> {
-    let missing: Vec<LegNumber> = plan
-        .legs()
+    let missing: Vec<SegmentNumber> = plan
+        .segments()
         .into_iter()
-        .filter(|number| !on_record.iter().any(|leg| leg.is(number)))
+        .filter(|number| !on_record.iter().any(|segment| segment.is(number)))
         .collect();
-    let driven: Vec<Leg> = in_groups(&missing, |first, numbers| {
-        let mut legs: Vec<Option<Leg>> = vec![None; numbers.len()];
-        drive::side_by_side(numbers, plan.seed, [first, missing.len()], |place, leg| {
-            done(&leg)?;
-            legs[place] = Some(leg);
+    let driven: Vec<DriveSegment> = in_groups(&missing, |first, numbers| {
+        let mut segments: Vec<Option<DriveSegment>> = vec![None; numbers.len()];
+        drive::side_by_side(numbers, plan.seed, [first, missing.len()], |place, segment| {
+            done(&segment)?;
+            segments[place] = Some(segment);
             Ok(())
         })?;
-        Ok(legs.into_iter().flatten().collect())
+        Ok(segments.into_iter().flatten().collect())
     })?;
-    let on_record = on_record.iter().filter(|leg| plan.has(leg));
+    let on_record = on_record.iter().filter(|segment| plan.has(segment));
     Ok(summary(plan, &on_record.chain(&driven).collect::<Vec<_>>()))
 }
 
-fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
+fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability {
     let of_cell = |world: &WorldKind, road: &Road| {
-        let mut of_cell: Vec<&Leg> = legs
+        let mut of_cell: Vec<&DriveSegment> = segments
             .iter()
             .copied()
-            .filter(|leg| leg.world == world.name && leg.road == road.name)
+            .filter(|segment| segment.world == world.name && segment.road == road.name)
             .collect();
-        // Sums are the same in whatever order the legs were driven.
-        of_cell.sort_by_key(|leg| leg.number);
+        // Sums are the same in whatever order the segments were driven.
+        of_cell.sort_by_key(|segment| segment.number);
         of_cell
     };
     let of_cell = &of_cell;
@@ -264,49 +266,54 @@ fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
         .iter()
         .filter(|world| world.judged && plan.roads.len() > 1);
     let together = several.map(|world| {
-        let on_all: Vec<&Leg> = plan.roads.iter().flat_map(|road| of_cell(world, road)).collect();
+        let on_all: Vec<&DriveSegment> = plan.roads.iter().flat_map(|road| of_cell(world, road)).collect();
         cell(world, "all", &on_all)
     });
     let together = together.collect();
-    let numbers = plan.legs();
+    let numbers = plan.segments();
     let happened = numbers.iter().filter_map(|number| {
-        let mut of_number = legs.iter().filter(|leg| leg.is(number));
-        let leg = of_number.next().copied()?;
-        (number.world.judged && leg.shows_something()).then(|| leg.clone())
+        let mut of_number = segments.iter().filter(|segment| segment.is(number));
+        let segment = of_number.next().copied()?;
+        (number.world.judged && segment.shows_something()).then(|| segment.clone())
     });
     Availability {
         seed: plan.seed,
         hours: plan.hours,
         cells,
         together,
-        legs: happened.collect(),
+        segments: happened.collect(),
     }
 }
 
-fn cell(world: &WorldKind, road: &'static str, legs: &[&Leg]) -> Cell {
-    let (lost, legs): (Vec<&Leg>, Vec<&Leg>) = legs.iter().copied().partition(|leg| leg.is_lost_by_hand());
+fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment]) -> Cell {
+    let (lost, segments): (Vec<&DriveSegment>, Vec<&DriveSegment>) = segments
+        .iter()
+        .copied()
+        .partition(|segment| segment.is_lost_by_hand());
     let lost_by_hand = Lost {
-        legs: lost.len(),
-        hours: lost.iter().map(|leg| leg.driven_s).sum::<f64>() / 3600.0,
-        declarations: lost.iter().map(|leg| leg.declarations.len()).sum(),
+        segments: lost.len(),
+        hours: lost.iter().map(|segment| segment.driven_s).sum::<f64>() / 3600.0,
+        declarations: lost.iter().map(|segment| segment.declarations.len()).sum(),
     };
-    let sum = |of: fn(&Leg) -> f64| legs.iter().map(|leg| of(leg)).sum::<f64>();
-    let hours = sum(|leg| leg.driven_s) / 3600.0;
-    let declared = || legs.iter().flat_map(|leg| &leg.declarations);
+    let sum = |of: fn(&DriveSegment) -> f64| segments.iter().map(|segment| of(segment)).sum::<f64>();
+    let hours = sum(|segment| segment.driven_s) / 3600.0;
+    let declared = || segments.iter().flat_map(|segment| &segment.declarations);
     let mut names: Vec<&str> = declared().map(|d| d.faults.as_str()).collect();
     names.sort_unstable();
     let mut causes: Vec<Cause> = names
         .chunk_by(|a, b| a == b)
         .map(|same| Cause {
             faults: same[0].into(),
-            rate: Rate::of(same.len() as u64, hours),
+            rate: Rate::new(same.len() as u64, hours),
         })
         .collect();
     causes.sort_by_key(|cause| std::cmp::Reverse(cause.rate.count));
     let cars = |with: bool| {
-        let chosen = legs.iter().filter(|leg| !with || !leg.declarations.is_empty());
+        let chosen = segments
+            .iter()
+            .filter(|segment| !with || !segment.declarations.is_empty());
         chosen
-            .map(|leg| leg.car)
+            .map(|segment| segment.car)
             .collect::<std::collections::BTreeSet<_>>()
             .len()
     };
@@ -315,16 +322,25 @@ fn cell(world: &WorldKind, road: &'static str, legs: &[&Leg]) -> Cell {
         road,
         judged: world.judged,
         hours,
-        available: sum(|leg| leg.active_s) / (3600.0 * hours),
-        declarations: Rate::of(declared().count() as u64, hours),
+        available: sum(|segment| segment.active_s) / (3600.0 * hours),
+        declarations: Rate::new(declared().count() as u64, hours),
         causes,
         cars: cars(false),
         cars_with: cars(true),
-        latched: legs.iter().filter(|leg| leg.ended == Ended::Latched).count(),
-        diverged: legs.iter().filter(|leg| leg.ended == Ended::Diverged).count(),
+        latched: segments
+            .iter()
+            .filter(|segment| segment.ended == Ended::Latched)
+            .count(),
+        diverged: segments
+            .iter()
+            .filter(|segment| segment.ended == Ended::Diverged)
+            .count(),
         lost_by_hand,
-        sdlp_m: sum(|leg| leg.sdlp_m) / legs.len() as f64,
-        largest_error_m: legs.iter().map(|leg| leg.largest_error_m).fold(0.0, f64::max),
+        sdlp_m: sum(|segment| segment.sdlp_m) / segments.len() as f64,
+        largest_error_m: segments
+            .iter()
+            .map(|segment| segment.largest_error_m)
+            .fold(0.0, f64::max),
     }
 }
 

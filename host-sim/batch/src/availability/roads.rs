@@ -6,7 +6,7 @@ use haptic_sim::worlds::Surface;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use super::LEG_S;
+use super::SEGMENT_S;
 
 /// A kind of road.
 #[derive(Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub const ROADS: [Road; 2] = [
 
 /// Least lateral acceleration of a curve that is one, m/s2.
 const LEAST_LATERAL_M_PER_S2: f64 = 0.3;
-/// Room behind the leg for the points that are looked at, s.
+/// Room behind the segment for the points that are looked at, s.
 const AHEAD_S: f64 = 3.0;
 
 /// A speed that is held for some seconds, falls to as little as 60 % of the first, and rises again: never beyond the first,
@@ -47,7 +47,7 @@ const AHEAD_S: f64 = 3.0;
 pub(super) fn falling_and_rising(first_kmh: f64, rng: &mut Xoshiro256PlusPlus) -> Speed {
     let (mut time, mut kmh) = (vec![0.0], vec![first_kmh]);
     let (mut now_s, mut now_kmh) = (0.0, first_kmh);
-    while now_s < LEG_S + AHEAD_S {
+    while now_s < SEGMENT_S + AHEAD_S {
         now_s += rng.random_range(3.0..12.0);
         time.push(now_s);
         kmh.push(now_kmh);
@@ -62,7 +62,7 @@ pub(super) fn falling_and_rising(first_kmh: f64, rng: &mut Xoshiro256PlusPlus) -
 }
 
 impl Road {
-    /// A course for a leg: a curve about every 20 s, to either side, as sharp as is drawn.
+    /// A course for a segment: a curve about every 20 s, to either side, as sharp as is drawn.
     pub(super) fn course(
         &self,
         v_m_per_s: f64,
@@ -74,7 +74,7 @@ impl Road {
         let mut segments = Vec::new();
         let mut driven_s = 0.0;
         let crossfall_rad = surface.straight_rad();
-        while driven_s < LEG_S + AHEAD_S {
+        while driven_s < SEGMENT_S + AHEAD_S {
             let straight_s = rng.random_range(4.0..10.0);
             let [into_s, arc_s] = [rng.random_range(2.0..3.5), rng.random_range(3.0..9.0)];
             let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };

@@ -13,19 +13,19 @@ fn intervals_are_those_of_the_tables() {
         (10, 4.795, 18.390),
         (100, 81.364, 121.627),
     ] {
-        let [from, to] = Rate::of(count, 1.0).interval;
+        let [from, to] = Rate::new(count, 1.0).interval;
         assert!(
             (from - low).abs() < 6e-4 && (to - high).abs() < 6e-4,
             "{count}: {from} {to}"
         );
     }
-    assert!((Rate::of(0, 1.0).upper_95 - 2.9957).abs() < 1e-4);
-    assert!((Rate::of(0, 300.0).upper_95 - 0.009_986).abs() < 1e-6);
+    assert!((Rate::new(0, 1.0).upper_95 - 2.9957).abs() < 1e-4);
+    assert!((Rate::new(0, 300.0).upper_95 - 0.009_986).abs() < 1e-6);
 }
 
-fn plan(hours: f64) -> Plan {
+fn plan(hours: f64) -> AvailabilityPlan {
     let named = |name: &str| WORLDS.iter().find(|c| c.name == name).unwrap();
-    Plan {
+    AvailabilityPlan {
         worlds: vec![named("calibrated"), named("everything")],
         roads: vec![&ROADS[1]],
         hours,
@@ -36,23 +36,25 @@ fn plan(hours: f64) -> Plan {
 
 #[test]
 fn legs_fill_the_hours_and_the_first_ones_stay_when_there_are_more() {
-    let [few, many] = [plan(0.25), plan(0.5)].map(|plan| plan.legs());
+    let [few, many] = [plan(0.25), plan(0.5)].map(|plan| plan.segments());
     assert_eq!((few.len(), many.len()), (6, 12));
-    for leg in &few {
-        let same = many
-            .iter()
-            .find(|other| other.number == leg.number && other.world == leg.world && other.road == leg.road);
-        assert_eq!(same.unwrap().scenario(1), leg.scenario(1));
+    for segment in &few {
+        let same = many.iter().find(|other| {
+            other.number == segment.number && other.world == segment.world && other.road == segment.road
+        });
+        assert_eq!(same.unwrap().scenario(1), segment.scenario(1));
     }
 }
 
 /// What is compared must differ in the world alone.
 #[test]
 fn worlds_share_road_driver_and_noise() {
-    let legs = plan(0.1).legs();
+    let segments = plan(0.1).segments();
     let of = |world: &str| {
-        let leg = legs.iter().find(|leg| leg.world.name == world && leg.number == 1);
-        leg.unwrap().scenario(3).unwrap()
+        let segment = segments
+            .iter()
+            .find(|segment| segment.world.name == world && segment.number == 1);
+        segment.unwrap().scenario(3).unwrap()
     };
     let (paper, real) = (of("calibrated"), of("everything"));
     assert_eq!(paper.speed_kmh(), real.speed_kmh());
@@ -72,12 +74,12 @@ fn worlds_share_road_driver_and_noise() {
 /// curve higher.
 #[test]
 fn roads_are_built_as_they_say() {
-    let leg = plan(0.1)
-        .legs()
+    let segment = plan(0.1)
+        .segments()
         .into_iter()
-        .find(|leg| leg.world.name == "everything")
+        .find(|segment| segment.world.name == "everything")
         .unwrap();
-    let scenario = leg.scenario(1).unwrap();
+    let scenario = segment.scenario(1).unwrap();
     let v = scenario.speed_m_per_s();
     let arcs = || {
         let segments = scenario.course().segments().iter();
@@ -94,19 +96,19 @@ fn roads_are_built_as_they_say() {
     assert!(sides.iter().all(|n| *n > 2), "{sides:?}");
 }
 
-/// Half of the legs on record: the rest is driven, nothing twice, and the results are those of one sitting.
+/// Half of the segments on record: the rest is driven, nothing twice, and the results are those of one sitting.
 #[test]
 fn an_interrupted_study_goes_on_where_it_was() {
     let plan = plan(0.05);
     let driven = std::sync::Mutex::new(Vec::new());
-    let keep = |leg: &Leg| {
-        driven.lock().unwrap().push(leg.clone());
+    let keep = |segment: &DriveSegment| {
+        driven.lock().unwrap().push(segment.clone());
         Ok(())
     };
     let whole = study(&plan, &[], keep).unwrap();
-    let mut legs = driven.into_inner().unwrap();
-    assert_eq!(legs.len(), 2);
-    let kept = legs.split_off(1);
+    let mut segments = driven.into_inner().unwrap();
+    assert_eq!(segments.len(), 2);
+    let kept = segments.split_off(1);
     let again = std::sync::Mutex::new(0);
     let resumed = study(&plan, &kept, |_| {
         *again.lock().unwrap() += 1;
@@ -131,11 +133,11 @@ fn an_interrupted_study_goes_on_where_it_was() {
 /// Three drives made up: a whole one, one that is lost with guidance and by hand, one that is lost with guidance alone.
 #[test]
 fn a_drive_that_is_lost_by_hand_is_counted_apart() {
-    let plan = Plan {
+    let plan = AvailabilityPlan {
         worlds: vec![WORLDS.iter().find(|world| world.name == "everything").unwrap()],
         ..plan(0.25)
     };
-    let drive = |number: u32, [ended, by_hand]: [Ended; 2]| Leg {
+    let drive = |number: u32, [ended, by_hand]: [Ended; 2]| DriveSegment {
         world: "everything".into(),
         road: "country".into(),
         number,
@@ -160,36 +162,40 @@ fn a_drive_that_is_lost_by_hand_is_counted_apart() {
         },
     };
     let (whole, lost) = (Ended::Whole, Ended::Diverged);
-    let legs = [
+    let segments = [
         drive(0, [whole, whole]),
         drive(1, [lost, lost]),
         drive(2, [lost, whole]),
     ];
-    let found = summary(&plan, &legs.iter().collect::<Vec<_>>());
+    let found = summary(&plan, &segments.iter().collect::<Vec<_>>());
     let cell = &found.cells[0];
     assert_eq!((cell.declarations.count, cell.diverged, cell.cars), (1, 1, 2));
     assert!((cell.hours - 0.04).abs() < 1e-12 && (cell.available - 0.5).abs() < 1e-12);
     let apart = &cell.lost_by_hand;
-    assert_eq!((apart.legs, apart.declarations), (1, 1));
+    assert_eq!((apart.segments, apart.declarations), (1, 1));
     assert!((apart.hours - 0.02).abs() < 1e-12);
     // What can be driven alone is named, the whole drive is not.
     assert_eq!(
-        found.legs.iter().map(|leg| leg.number).collect::<Vec<_>>(),
+        found
+            .segments
+            .iter()
+            .map(|segment| segment.number)
+            .collect::<Vec<_>>(),
         [1, 2]
     );
     assert!(found.together.is_empty() && found.judged().count() == 1);
     // Both roads together: two declarations in twice the time, and judged in place of each alone.
-    let both = Plan {
+    let both = AvailabilityPlan {
         roads: ROADS.iter().collect(),
         ..plan
     };
-    let on = |road: &str, leg: &Leg| Leg {
+    let on = |road: &str, segment: &DriveSegment| DriveSegment {
         road: road.into(),
-        ..leg.clone()
+        ..segment.clone()
     };
-    let all: Vec<Leg> = ROADS
+    let all: Vec<DriveSegment> = ROADS
         .iter()
-        .flat_map(|r| legs.iter().map(|leg| on(r.name, leg)))
+        .flat_map(|r| segments.iter().map(|segment| on(r.name, segment)))
         .collect();
     let found = summary(&both, &all.iter().collect::<Vec<_>>());
     let [together] = found.judged().collect::<Vec<_>>()[..] else {
@@ -198,11 +204,11 @@ fn a_drive_that_is_lost_by_hand_is_counted_apart() {
     assert_eq!((together.road, together.declarations.count), ("all", 2));
     assert!((together.hours - 0.08).abs() < 1e-12 && (together.available - 0.5).abs() < 1e-12);
     assert_eq!(
-        (together.cars, together.lost_by_hand.legs, found.cells.len()),
+        (together.cars, together.lost_by_hand.segments, found.cells.len()),
         (2, 2, 2)
     );
     // Nothing is known of a rate where every drive is lost by hand.
-    let none = summary(&both, &[&legs[1]]);
+    let none = summary(&both, &[&segments[1]]);
     assert!(
         none.cells
             .iter()
@@ -214,15 +220,21 @@ fn a_drive_that_is_lost_by_hand_is_counted_apart() {
 #[test]
 fn thirty_cars_drive() {
     let mut all = plan(5.0);
-    let cars = |plan: &Plan| {
-        let scenarios = plan.legs().into_iter().map(|leg| leg.scenario(1).unwrap());
+    let cars = |plan: &AvailabilityPlan| {
+        let scenarios = plan
+            .segments()
+            .into_iter()
+            .map(|segment| segment.scenario(1).unwrap());
         let cars = scenarios.filter_map(|scenario| scenario.tolerances().car);
         cars.collect::<std::collections::BTreeSet<_>>()
     };
     assert_eq!(cars(&all).len(), 30);
     all.only = vec![7, 31];
     assert_eq!(
-        all.legs().iter().map(|leg| leg.number).collect::<Vec<_>>(),
+        all.segments()
+            .iter()
+            .map(|segment| segment.number)
+            .collect::<Vec<_>>(),
         [7, 31, 7, 31]
     );
 }
@@ -235,7 +247,7 @@ fn braking_in_a_real_world_is_no_fault() {
     let mut active_s = 0.0;
     for road in &ROADS {
         for number in 0..3 {
-            let number = LegNumber { world, road, number };
+            let number = SegmentNumber { world, road, number };
             let scenario = number.scenario(1).unwrap();
             let Speed::ByTime { speed_m_per_s, .. } = scenario.speed() else {
                 panic!("one speed");
@@ -244,35 +256,39 @@ fn braking_in_a_real_world_is_no_fault() {
             let least = speed_m_per_s.iter().copied().fold(f64::INFINITY, f64::min);
             assert!(speed_m_per_s.len() > 40 && least < 0.7 * first);
             assert!(speed_m_per_s.iter().all(|v| *v <= first));
-            let leg = number.drive(1).unwrap();
-            assert_eq!((leg.ended, &leg.declarations), (Ended::Whole, &vec![]), "{leg:?}");
-            active_s += leg.active_s;
+            let segment = number.drive(1).unwrap();
+            assert_eq!(
+                (segment.ended, &segment.declarations),
+                (Ended::Whole, &vec![]),
+                "{segment:?}"
+            );
+            active_s += segment.active_s;
         }
     }
     assert!(active_s > 1790.0, "{active_s}");
 }
 
-/// Every field of every leg: side by side as alone with the shipping ECU, where all can be vectorised, where none can for the
+/// Every field of every segment: side by side as alone with the shipping ECU, where all can be vectorised, where none can for the
 /// camera, and where some drives are rejected.
 #[test]
 fn legs_are_the_same_side_by_side() {
     for name in ["calibrated", "everything", "camera", "slippery"] {
         let world = WORLDS.iter().find(|world| world.name == name).unwrap();
-        let legs: Vec<LegNumber> = (7..9)
+        let segments: Vec<SegmentNumber> = (7..9)
             .zip(&ROADS)
-            .map(|(number, road)| LegNumber { world, road, number })
+            .map(|(number, road)| SegmentNumber { world, road, number })
             .collect();
-        let mut found = vec![None; legs.len()];
-        let keep = |place: usize, leg| {
-            assert_eq!(found[place].replace(leg), None, "{name} {place}");
+        let mut found = vec![None; segments.len()];
+        let keep = |place: usize, segment| {
+            assert_eq!(found[place].replace(segment), None, "{name} {place}");
             Ok(())
         };
-        drive::side_by_side(&legs, 1, [0, legs.len()], keep).unwrap();
-        for (number, leg) in legs.iter().zip(&found) {
+        drive::side_by_side(&segments, 1, [0, segments.len()], keep).unwrap();
+        for (number, segment) in segments.iter().zip(&found) {
             // As the file has it, which tells 0 from -0.
-            let text = |leg: &Leg| toml::to_string(leg).unwrap();
+            let text = |segment: &DriveSegment| toml::to_string(segment).unwrap();
             assert_eq!(
-                text(leg.as_ref().unwrap()),
+                text(segment.as_ref().unwrap()),
                 text(&number.drive(1).unwrap()),
                 "{name}"
             );

@@ -1,17 +1,16 @@
 //! The file of a comparison, checked before anything is driven.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use haptic_sim::input::{InputError, parse_toml};
-use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario, Speed};
 use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::drive::METRICS;
-use super::parts::{Source, parts, unknown};
+use super::parts::{parts, unknown};
 use super::{Compare, Drives, Faults, Kinds, Tuning};
+use crate::files::{Source, one};
 use crate::study::check_names;
 
 #[derive(Deserialize)]
@@ -60,10 +59,6 @@ struct TuningFile {
     weights: Option<BTreeMap<String, f64>>,
 }
 
-fn one() -> u64 {
-    1
-}
-
 /// What is weighed where a file says nothing: 1 m of peak, 1 N.m of effort and 1 N.m of conflict count alike (chosen here).
 const WEIGHTS: [&str; 3] = [
     "peak_lateral_error_m",
@@ -75,32 +70,21 @@ const MOST_DRIVES: f64 = 1e6;
 /// How long a failed drive goes on if a file says nothing, s.
 const LASTS_S: f64 = 15.0;
 
-pub(super) fn load<'k>(path: &Path, kinds: &'k Kinds) -> Result<Compare<'k>, InputError> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
-    from_text(&name, &text, path.parent().unwrap_or(Path::new("")), kinds)
-}
-
 pub(super) fn from_text<'k>(
-    name: &str,
+    source: &Source,
     text: &str,
-    folder: &Path,
     kinds: &'k Kinds,
 ) -> Result<Compare<'k>, InputError> {
-    let source = Source {
-        name: name.into(),
-        folder,
-    };
-    let file: File = parse_toml(name, text)?;
+    let file: File = parse_toml(&source.name, text)?;
     check_names("comparison", [&file.name]).map_err(|e| source.bad(e))?;
-    let (tables, oracles) = oracles(&source, &file.law)?;
-    let laws = parts(&source, "law", &tables, &kinds.laws)?;
-    let drivers = parts(&source, "driver", &file.driver, &kinds.drivers)?;
-    let (worlds, judged) = worlds(&source, &file)?;
+    let (tables, oracles) = oracles(source, &file.law)?;
+    let laws = parts(source, "law", &tables, &kinds.laws)?;
+    let drivers = parts(source, "driver", &file.driver, &kinds.drivers)?;
+    let (worlds, judged) = worlds(source, &file)?;
     let tuning = file
         .tuning
         .as_ref()
-        .map(|t| tuning(&source, &file.scenario, t))
+        .map(|t| tuning(source, &file.scenario, t))
         .transpose()?;
     let faults = Faults {
         sudden_loss: source.count("faults.sudden_loss", file.faults.sudden_loss, 0.0, 1000.0)?,
@@ -119,7 +103,7 @@ pub(super) fn from_text<'k>(
         tuning,
         faults,
     };
-    check_parts(&source, &compare)?;
+    check_parts(source, &compare)?;
     Ok(compare)
 }
 
@@ -157,10 +141,7 @@ fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputEr
                 _ => _ = fields.insert(name.clone(), value.clone()),
             }
         }
-        let source = Source {
-            name: format!("{}: world {}", source.name, world.name),
-            folder: source.folder,
-        };
+        let source = Source::new(format!("{}: world {}", source.name, world.name), source.folder);
         let made = drives(&source, &fields)?;
         all.places.extend(made.places);
         all.seeds = made.seeds;
@@ -265,9 +246,7 @@ pub(crate) fn drives(
         let mut fields = fields.clone();
         fields.insert("course".into(), Value::String(road.clone()));
         let scenario = Scenario::from_toml(&here, &fields.to_string(), |course, lane| {
-            let path = source.folder.join(course);
-            let bytes = std::fs::read(&path).map_err(|e| InputError::new(path.display(), e))?;
-            Course::from_text(course, &String::from_utf8_lossy(&bytes), lane)
+            source.course(course, lane)
         })?;
         if scenario.condition() == Condition::Manual || scenario.failure().kind != FailureKind::None {
             return Err(source.bad("scenario.condition = \"manual\": a law of kind \"none\" is no guidance"));

@@ -27,10 +27,12 @@ use haptic_sim::scenario::{Scenario, ScenarioError};
 use haptic_sim::seeds::named;
 use rayon::prelude::*;
 
+use crate::files::Source;
+
 pub use drive::{Driven, METRICS, Metric};
 pub(crate) use drive::{failures, measured};
 pub(crate) use file::drives;
-pub(crate) use parts::{Source, parts, unknown};
+pub(crate) use parts::{parts, unknown};
 pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean, Ratio};
 
 /// The laws, drivers and habits that a file may name.
@@ -181,7 +183,8 @@ impl<'k> Compare<'k> {
     /// # Errors
     /// The file, the field, its value and its range.
     pub fn load(path: &Path, kinds: &'k Kinds) -> Result<Self, InputError> {
-        file::load(path, kinds)
+        let (source, text) = Source::open(path)?;
+        file::from_text(&source, &text, kinds)
     }
 
     /// Drives in all, tuning included and failures left out.

@@ -1,41 +1,12 @@
 //! The laws and drivers that a file names, with their parameters.
 
-use std::path::Path;
-
-use haptic_sim::input::{InputError, in_range};
+use haptic_sim::input::InputError;
 use haptic_sim::kind::{Kind, Make};
 use toml::{Table, Value};
 
 use super::Chosen;
+use crate::files::Source;
 use crate::study::check_names;
-
-/// Where a file is, for its errors and its courses.
-pub(crate) struct Source<'a> {
-    pub(crate) name: String,
-    pub(crate) folder: &'a Path,
-}
-
-impl Source<'_> {
-    pub(crate) fn bad(&self, message: impl std::fmt::Display) -> InputError {
-        InputError::new(&self.name, message)
-    }
-
-    pub(crate) fn within(
-        &self,
-        field: &str,
-        value: f64,
-        low: f64,
-        high: f64,
-        unit: &'static str,
-    ) -> Result<(), InputError> {
-        in_range(field, value, low..=high, unit).map_err(|e| self.bad(e))
-    }
-
-    pub(crate) fn count(&self, field: &str, value: u64, low: f64, high: f64) -> Result<u32, InputError> {
-        self.within(field, value as f64, low, high, "")?;
-        Ok(value as u32)
-    }
-}
 
 /// What a file's laws or drivers are.
 pub(crate) fn parts<'k, P: ?Sized>(

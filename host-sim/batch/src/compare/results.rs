@@ -144,11 +144,15 @@ impl CompareResults {
     /// What the file system says.
     #[cfg(feature = "parquet")]
     pub fn write_parquet(&self, file: std::fs::File) -> std::io::Result<()> {
-        use crate::parquet::{Cell, Column, Table};
-        let (number, whole) = (|| Column::Number(Vec::new()), || Column::Whole(Vec::new()));
-        let texts = ["law", "driver", "world", "road"].map(|name| (name, Column::Text(Vec::new())));
+        use crate::parquet::{Cell, ParquetColumn, Table};
+        let (number, whole) = (
+            || ParquetColumn::Number(Vec::new()),
+            || ParquetColumn::Whole(Vec::new()),
+        );
+        let texts = ["law", "driver", "world", "road"].map(|name| (name, ParquetColumn::Text(Vec::new())));
         let metrics = METRICS.map(|metric| (metric.name, number()));
-        let flags = ["off_road", "guidance_left_by_itself"].map(|name| (name, Column::Flag(Vec::new())));
+        let flags =
+            ["off_road", "guidance_left_by_itself"].map(|name| (name, ParquetColumn::Flag(Vec::new())));
         let columns = texts
             .into_iter()
             .chain([("speed_kmh", number()), ("seed", whole())])

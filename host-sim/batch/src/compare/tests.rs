@@ -7,9 +7,11 @@ use haptic_sim::scenario::{Failure, FailureKind};
 use haptic_sim::{Scenario, Simulation};
 
 use super::*;
+use crate::files::Source;
+use crate::files::tests::check_refusals;
 
 const ROAD: &str =
-    "lane_width = 3.6\n[[segment]]\nlength = 200\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+    "lane_width_m = 3.6\n[[segment]]\nlength_m = 200\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
 const FILE: &str = "
 name = 'short'
 seeds = 2
@@ -48,7 +50,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn compare<'k>(text: &str, kinds: &'k Kinds) -> Result<Compare<'k>, InputError> {
-    file::from_text("study.toml", text, folder().path(), kinds)
+    file::from_text(&Source::new("study.toml", folder().path()), text, kinds)
 }
 
 fn results(text: &str) -> CompareResults {
@@ -377,10 +379,5 @@ fn a_law_of_the_ecu_is_refused_beside_laws_of_the_file() {
 #[test]
 fn a_wrong_file_is_refused_by_field_value_and_range() {
     let kinds = Kinds::default();
-    for (from, to, says) in WRONG {
-        let text = FILE.replacen(from, to, 1);
-        assert_ne!(text, FILE, "{from}");
-        let error = compare(&text, &kinds).err().unwrap().to_string();
-        assert!(error.contains(says), "{to}: {error}");
-    }
+    check_refusals(FILE, &WRONG, |text| compare(text, &kinds).err());
 }

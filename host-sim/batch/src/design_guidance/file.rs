@@ -1,7 +1,6 @@
 //! The file of a design, checked before anything is driven.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use haptic_core::controller::params::Params;
 use haptic_sim::input::{InputError, parse_toml};
@@ -13,7 +12,8 @@ use toml::Table;
 
 use super::search::BARS;
 use super::{DesignGuidance, Gains, Member, Stage};
-use crate::compare::{Source, drives, unknown};
+use crate::compare::{drives, unknown};
+use crate::files::Source;
 use crate::study::check_names;
 
 #[derive(Deserialize)]
@@ -67,16 +67,11 @@ pub(super) fn published() -> Gains {
 }
 
 pub(super) fn from_text(
-    name: &str,
+    source: &Source,
     text: &str,
-    folder: &Path,
     own_line_share: Option<f64>,
 ) -> Result<DesignGuidance, InputError> {
-    let source = Source {
-        name: name.into(),
-        folder,
-    };
-    let file: File = parse_toml(name, text)?;
+    let file: File = parse_toml(&source.name, text)?;
     check_names("design", [&file.name]).map_err(|e| source.bad(e))?;
     if file.law != "paper" {
         return Err(source.bad(unknown("law", &file.law, ["paper"].into_iter())));
@@ -85,7 +80,7 @@ pub(super) fn from_text(
     let stage = |stream, table: &str, file_of: &StageFile, share, turn| {
         let (roads, speeds_m_per_s) = (&file_of.roads, &file_of.speeds_m_per_s);
         let drives = drives(
-            &source,
+            source,
             table,
             &file.scenario,
             roads,
@@ -102,7 +97,7 @@ pub(super) fn from_text(
             scenarios,
             seeds: drives.seeds,
             losses: source.count(&format!("{table}losses"), file_of.losses, 1.0, 1000.0)?,
-            drivers: population(&source, &file.population, share, turn)?,
+            drivers: population(source, &file.population, share, turn)?,
         })
     };
     let stages = [
@@ -129,8 +124,8 @@ pub(super) fn from_text(
         seed: file.seed,
         budget: source.count("search.budget", file.search.budget, 8.0, 100_000.0)?,
         stretches: file.search.stretch,
-        range: range(&source, file.search.scales)?,
-        bars: bars(&source, &file.bars)?,
+        range: range(source, file.search.scales)?,
+        bars: bars(source, &file.bars)?,
         identity: named(0, &format!("{text}{share}{courses}")),
         stages,
     };

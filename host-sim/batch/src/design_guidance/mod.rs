@@ -20,6 +20,7 @@ mod tests;
 use std::path::Path;
 
 use crate::error::StudyError;
+use crate::files::Source;
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
 use serde::Serialize;
@@ -81,10 +82,8 @@ impl DesignGuidance {
     /// # Errors
     /// The file, the field, its value and its range.
     pub fn load(path: &Path, own_line_share: Option<f64>) -> Result<Self, InputError> {
-        let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        file::from_text(&name, &text, folder, own_line_share)
+        let (source, text) = Source::open(path)?;
+        file::from_text(&source, &text, own_line_share)
     }
 
     /// Tells what it drives from what another design drives.

@@ -8,38 +8,17 @@ use haptic_sim::simulation::simulate;
 use super::search::{front, ratios};
 use super::*;
 use crate::compare::seed_of;
+use crate::files::Source;
+use crate::files::tests::check_refusals;
 
 const ROAD: &str =
-    "lane_width = 3.6\n[[segment]]\nlength = 150\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
-const FILE: &str = "
-name = 'short'
-law = 'paper'
-[scenario]
-driver = { remnant_sd_nm = 0.1 }
-[population]
-participants = [2, 13]
-own_line_share = 0.5
-own_line_m = 0.3
-[search]
-budget = 8
-stretch = [[1, 1], [inf, inf]]
-scales = [[0.5, 9], [0.5, 2], [0.5, 2], [0.5, 2]]
-[training]
-seeds = 1
-roads = ['road.toml']
-speeds_m_per_s = [16.666666666666668]
-losses = 2
-[held_out]
-seeds = 2
-roads = ['road.toml']
-speeds_m_per_s = [13.88888888888889]
-losses = 1
-";
+    "lane_width_m = 3.6\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
+const FILE: &str = include_str!("short.toml");
 
 fn design(text: &str) -> Result<DesignGuidance, InputError> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("road.toml"), ROAD).unwrap();
-    file::from_text("design.toml", text, folder.path(), None)
+    file::from_text(&Source::new("design.toml", folder.path()), text, None)
 }
 
 #[test]
@@ -263,13 +242,8 @@ const WRONG: [(&str, &str, &str); 15] = [
 
 #[test]
 fn a_wrong_file_is_refused_by_field_value_and_range() {
-    for (from, to, says) in WRONG {
-        let text = FILE.replacen(from, to, 1);
-        assert_ne!(text, FILE, "{from}");
-        let error = design(&text).unwrap_err().to_string();
-        assert!(error.contains(says), "{to}: {error}");
-    }
-    let error = file::from_text("design.toml", "name = ", Path::new(""), None).unwrap_err();
+    check_refusals(FILE, &WRONG, |text| design(text).err());
+    let error = file::from_text(&Source::new("design.toml", Path::new("")), "name = ", None).unwrap_err();
     assert!(
         error
             .to_string()

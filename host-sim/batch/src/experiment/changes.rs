@@ -13,7 +13,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Plan;
+use super::ExperimentPlan;
 use super::changing::{Changed, driver_at};
 use super::corruptions::{Held, tolerance};
 use super::drives::guided;
@@ -51,12 +51,9 @@ pub struct ChangesLine {
 /// The whole population.
 #[derive(Debug, Clone, Serialize)]
 pub struct Changes {
-    /// Numbers of the participants.
-    pub participants: Vec<u32>,
-    /// Amplitude of the probe, N.m.
-    pub probe_nm: f64,
-    /// Seed of the first drive of each participant; the others count on from it.
-    pub seed: u64,
+    /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
+    #[serde(flatten)]
+    pub plan: ExperimentPlan,
     /// Drives of each participant.
     pub drives: u32,
     /// By kind.
@@ -72,7 +69,12 @@ pub struct Changes {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> Result<Changes, StudyError> {
+pub fn changes(
+    plan: &ExperimentPlan,
+    drives: u32,
+    only: &str,
+    done: impl Fn() + Sync,
+) -> Result<Changes, StudyError> {
     let kinds: Vec<_> = KINDS.iter().filter(|(name, _)| name.contains(only)).collect();
     if kinds.is_empty() {
         let names = KINDS.map(|k| k.0).join("; ");
@@ -84,10 +86,7 @@ pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> 
         .map(|(number, published, drive)| {
             let place = (drive as usize + number as usize) % kinds.len();
             let (name, kind) = kinds[place];
-            let plan = Plan {
-                seed: plan.seed.wrapping_add(drive),
-                ..plan.clone()
-            };
+            let plan = plan.repetition(drive);
             let seed = plan.seed.wrapping_mul(100).wrapping_add(u64::from(number));
             let drawn = kind.drawn(&published, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
             let log = drawn.log(&plan, number)?;
@@ -166,7 +165,7 @@ impl ChangesLine {
             self.identified[place] += named;
             self.false_identifications[place] += named * usize::from(far.count() * 2 > truths.len());
             let middle = truths[truths.len() / 2][i];
-            self.intervals[place] = self.intervals[place] + Held::of(std::iter::once(&middle));
+            self.intervals[place] = self.intervals[place] + Held::new(std::iter::once(&middle));
         }
     }
 
@@ -192,7 +191,7 @@ fn nearest(changes: &[Change], at_s: f64) -> Option<&Change> {
 }
 
 impl Changes {
-    fn new(plan: &Plan, drives: u32, lines: Vec<ChangesLine>) -> Self {
+    fn new(plan: &ExperimentPlan, drives: u32, lines: Vec<ChangesLine>) -> Self {
         let promised = lines.iter().filter(|l| l.kind != ASSUMED_NOT_TO);
         let all = promised.cloned().reduce(ChangesLine::and).unwrap_or_default();
         let all = ChangesLine { kind: "all", ..all };
@@ -220,9 +219,7 @@ impl Changes {
             ));
         }
         Self {
-            participants: plan.participants.clone(),
-            probe_nm: plan.probe_nm,
-            seed: plan.seed,
+            plan: plan.clone(),
             drives,
             lines,
             all,

@@ -39,7 +39,7 @@ pub struct DriverChanges {
 
 impl Changed {
     /// Its value.
-    pub fn of(self, driver: &PublishedDriver) -> f64 {
+    pub fn value(self, driver: &PublishedDriver) -> f64 {
         match self {
             Self::KHg => driver.k_hg.unwrap_or(0.0),
             Self::KD => driver.k_d,
@@ -65,7 +65,7 @@ pub fn driver_at(first: &PublishedDriver, changes: &[DriverChanges], time_s: f64
         } else {
             1.0
         };
-        let from = change.what.of(&now);
+        let from = change.what.value(&now);
         change.what.set(&mut now, from + share * (change.to - from));
     }
     now
@@ -111,12 +111,12 @@ pub(super) fn driven_changing(
 mod tests {
     use super::*;
     use crate::experiment::drives::scenario_of_drive;
-    use crate::experiment::{Plan, chosen};
+    use crate::experiment::{ExperimentPlan, chosen};
 
     /// A driver who changes to what he is leaves the log of one who does not; one who changes leaves the same log up to there.
     #[test]
     fn a_change_to_the_same_changes_nothing() {
-        let plan = Plan {
+        let plan = ExperimentPlan {
             participants: vec![2],
             probe_nm: 0.2,
             seed: 3,

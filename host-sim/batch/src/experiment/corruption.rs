@@ -5,7 +5,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
-use super::Plan;
+use super::ExperimentPlan;
 use super::PublishedDriver;
 use super::kinds::{Drawn, Kind};
 
@@ -52,106 +52,56 @@ pub enum Corruption {
     Driver(Kind),
 }
 
+/// Ways with their names, a line each.
+macro_rules! population {
+    ($($name:literal [$($way:ident$(($($of:expr),*))?),*];)*) => {
+        [$(($name, &[$(Corruption::$way$(($($of),*))?),*])),*]
+    };
+}
+
 /// The ways of the population with their names: each alone, then mixtures.
-pub const POPULATION: [(&str, &[Corruption]); 34] = [
-    ("clean", &[]),
-    ("one e_theta sample off by 0.05 rad", &[Corruption::Outlier]),
-    (
-        "lane noise 5 mm, 0.5 mrad",
-        &[Corruption::LaneNoise(5e-3, 5e-4, 1)],
-    ),
-    (
-        "lane noise 10 mm, 1 mrad",
-        &[Corruption::LaneNoise(1e-2, 1e-3, 1)],
-    ),
-    (
-        "lane noise 30 mm, 5 mrad at 30 Hz",
-        &[Corruption::LaneNoise(3e-2, 5e-3, 4)],
-    ),
-    ("e_theta in steps of 2 mrad", &[Corruption::Steps(2e-3)]),
-    ("five lane samples zero", &[Corruption::ZeroSamples(5)]),
-    ("lane zero for 0.1 s", &[Corruption::ZeroFor(0.1)]),
-    ("lane zero for 2 s", &[Corruption::ZeroFor(2.0)]),
-    ("T_d is noise", &[Corruption::TorqueNoise(0.2)]),
-    ("hands off for 30 s", &[Corruption::HandsOff(30.0)]),
-    ("parked for 20 s, wheel askew", &[Corruption::Parked(20.0)]),
-    ("T_d at half scale", &[Corruption::TorqueScale(0.5)]),
-    ("T_d 50 ms late", &[Corruption::TorqueLate(0.05)]),
-    ("T_h 8 ms late", &[Corruption::GuidanceLate(0.008)]),
-    ("sign of T_d", &[Corruption::TorqueSign]),
-    ("sign of T_h", &[Corruption::GuidanceSign]),
-    ("sign of the wheel angle", &[Corruption::WheelSign]),
-    ("signs of the lane", &[Corruption::LaneSign]),
-    ("guided, called manual", &[Corruption::CalledManual]),
-    ("T_d is T_d + T_h", &[Corruption::SumOfTorques]),
-    ("t_nms 0.15 s", &[Corruption::OtherMuscle(0.15)]),
-    ("t_nms 0.06 s", &[Corruption::OtherMuscle(0.06)]),
-    (
-        "noise 10 mm, outlier, five zeros",
-        &[
-            Corruption::LaneNoise(1e-2, 1e-3, 1),
-            Corruption::Outlier,
-            Corruption::ZeroSamples(5),
-        ],
-    ),
-    (
-        "noise 10 mm, hands off, zero for 2 s",
-        &[
-            Corruption::LaneNoise(1e-2, 1e-3, 1),
-            Corruption::HandsOff(30.0),
-            Corruption::ZeroFor(2.0),
-        ],
-    ),
-    (
-        "noise 5 mm, parked",
-        &[Corruption::LaneNoise(5e-3, 5e-4, 1), Corruption::Parked(20.0)],
-    ),
-    (
-        "noise 30 mm at 30 Hz, T_h 8 ms late",
-        &[
-            Corruption::LaneNoise(3e-2, 5e-3, 4),
-            Corruption::GuidanceLate(0.008),
-        ],
-    ),
-    (
-        "steps, outlier, hands off",
-        &[
-            Corruption::Steps(2e-3),
-            Corruption::Outlier,
-            Corruption::HandsOff(30.0),
-        ],
-    ),
-    (
-        "noise 10 mm, t_nms 0.15 s",
-        &[
-            Corruption::LaneNoise(1e-2, 1e-3, 1),
-            Corruption::OtherMuscle(0.15),
-        ],
-    ),
-    ("K_hg steps by 0.5", &[Corruption::Driver(Kind::KHgSteps(0.5))]),
-    (
-        "K_hg drifts by 0.5 in 60 s",
-        &[Corruption::Driver(Kind::KHgDrifts(0.5))],
-    ),
-    ("K_d steps by half", &[Corruption::Driver(Kind::KDSteps)]),
-    (
-        "t_p steps from 0.1 to 0.3 s",
-        &[Corruption::Driver(Kind::TPSteps)],
-    ),
-    (
-        "noise 10 mm, K_hg steps by 0.5",
-        &[
-            Corruption::LaneNoise(1e-2, 1e-3, 1),
-            Corruption::Driver(Kind::KHgSteps(0.5)),
-        ],
-    ),
-];
+pub const POPULATION: [(&str, &[Corruption]); 34] = population! {
+    "clean" [];
+    "one e_theta sample off by 0.05 rad" [Outlier];
+    "lane noise 5 mm, 0.5 mrad" [LaneNoise(5e-3, 5e-4, 1)];
+    "lane noise 10 mm, 1 mrad" [LaneNoise(1e-2, 1e-3, 1)];
+    "lane noise 30 mm, 5 mrad at 30 Hz" [LaneNoise(3e-2, 5e-3, 4)];
+    "e_theta in steps of 2 mrad" [Steps(2e-3)];
+    "five lane samples zero" [ZeroSamples(5)];
+    "lane zero for 0.1 s" [ZeroFor(0.1)];
+    "lane zero for 2 s" [ZeroFor(2.0)];
+    "T_d is noise" [TorqueNoise(0.2)];
+    "hands off for 30 s" [HandsOff(30.0)];
+    "parked for 20 s, wheel askew" [Parked(20.0)];
+    "T_d at half scale" [TorqueScale(0.5)];
+    "T_d 50 ms late" [TorqueLate(0.05)];
+    "T_h 8 ms late" [GuidanceLate(0.008)];
+    "sign of T_d" [TorqueSign];
+    "sign of T_h" [GuidanceSign];
+    "sign of the wheel angle" [WheelSign];
+    "signs of the lane" [LaneSign];
+    "guided, called manual" [CalledManual];
+    "T_d is T_d + T_h" [SumOfTorques];
+    "t_nms 0.15 s" [OtherMuscle(0.15)];
+    "t_nms 0.06 s" [OtherMuscle(0.06)];
+    "noise 10 mm, outlier, five zeros" [LaneNoise(1e-2, 1e-3, 1), Outlier, ZeroSamples(5)];
+    "noise 10 mm, hands off, zero for 2 s" [LaneNoise(1e-2, 1e-3, 1), HandsOff(30.0), ZeroFor(2.0)];
+    "noise 5 mm, parked" [LaneNoise(5e-3, 5e-4, 1), Parked(20.0)];
+    "noise 30 mm at 30 Hz, T_h 8 ms late" [LaneNoise(3e-2, 5e-3, 4), GuidanceLate(0.008)];
+    "steps, outlier, hands off" [Steps(2e-3), Outlier, HandsOff(30.0)];
+    "noise 10 mm, t_nms 0.15 s" [LaneNoise(1e-2, 1e-3, 1), OtherMuscle(0.15)];
+    "K_hg steps by 0.5" [Driver(Kind::KHgSteps(0.5))];
+    "K_hg drifts by 0.5 in 60 s" [Driver(Kind::KHgDrifts(0.5))];
+    "K_d steps by half" [Driver(Kind::KDSteps)];
+    "t_p steps from 0.1 to 0.3 s" [Driver(Kind::TPSteps)];
+    "noise 10 mm, K_hg steps by 0.5" [LaneNoise(1e-2, 1e-3, 1), Driver(Kind::KHgSteps(0.5))];
+};
 
 /// The drive in which the driver changes, if one of the ways is that; the same for the same plan and participant.
 pub(super) fn changing(
     ways: &[Corruption],
     truth: &PublishedDriver,
-    plan: &Plan,
+    plan: &ExperimentPlan,
     number: u32,
 ) -> Option<Drawn> {
     let mut random = random_of(plan, number);
@@ -161,12 +111,17 @@ pub(super) fn changing(
     })
 }
 
-fn random_of(plan: &Plan, number: u32) -> Xoshiro256PlusPlus {
+fn random_of(plan: &ExperimentPlan, number: u32) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)))
 }
 
 /// `log` as these ways leave it; the same for the same plan and participant.
-pub(super) fn corrupted_log(log: &DriveLog, ways: &[Corruption], plan: &Plan, number: u32) -> DriveLog {
+pub(super) fn corrupted_log(
+    log: &DriveLog,
+    ways: &[Corruption],
+    plan: &ExperimentPlan,
+    number: u32,
+) -> DriveLog {
     let mut random = random_of(plan, number);
     let mut log = log.clone();
     for way in ways {

@@ -9,7 +9,7 @@ use haptic_analysis::identify::{DriveLog, Identification, Options, Traces, ident
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Plan;
+use super::ExperimentPlan;
 use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
 use super::drives::{driven_by, guided};
@@ -31,7 +31,7 @@ impl Held {
         (self.identified > 0).then(|| self.held as f64 / self.identified as f64)
     }
 
-    pub(super) fn of<'a>(values: impl Iterator<Item = &'a Compared>) -> Self {
+    pub(super) fn new<'a>(values: impl Iterator<Item = &'a Compared>) -> Self {
         values
             .filter(|v| v.1.identified)
             .fold(Self::default(), |sum, v| Self {
@@ -84,12 +84,9 @@ pub struct CorruptionLine {
 /// The whole population.
 #[derive(Debug, Clone, Serialize)]
 pub struct Corruptions {
-    /// Numbers of the participants.
-    pub participants: Vec<u32>,
-    /// Amplitude of the probe, N.m.
-    pub probe_nm: f64,
-    /// Seed of the first drive of each participant; the others count on from it.
-    pub seed: u64,
+    /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
+    #[serde(flatten)]
+    pub plan: ExperimentPlan,
     /// Drives of each participant and way.
     pub seeds: u32,
     /// By corruption.
@@ -115,7 +112,7 @@ pub struct Corruptions {
 /// # Errors
 /// As [`super::experiment`].
 pub fn corruptions(
-    plan: &Plan,
+    plan: &ExperimentPlan,
     seeds: u32,
     only: &str,
     done: impl Fn() + Sync,
@@ -130,10 +127,7 @@ pub fn corruptions(
     let found = jobs
         .into_par_iter()
         .map(|(number, truth, seed)| {
-            let plan = Plan {
-                seed: plan.seed.wrapping_add(seed),
-                ..plan.clone()
-            };
+            let plan = plan.repetition(seed);
             let mut clean: Vec<(f64, DriveLog)> = Vec::new();
             let mut fits = Vec::with_capacity(ways.len());
             for (_, ways) in &ways {
@@ -219,7 +213,7 @@ impl CorruptionLine {
             let e = error(v).abs();
             e > tolerance(v.0, v.2) && v.1.standard_error.is_some_and(|s| e > 4.0 * s)
         });
-        let intervals: [Held; COMPARED] = std::array::from_fn(|i| Held::of(found.iter().map(|f| &f.0[i])));
+        let intervals: [Held; COMPARED] = std::array::from_fn(|i| Held::new(found.iter().map(|f| &f.0[i])));
         let mut causes: Vec<(String, usize)> = Vec::new();
         for cause in found
             .iter()
@@ -266,7 +260,12 @@ fn in_words(cause: &str) -> String {
 }
 
 impl Corruptions {
-    pub(super) fn new(plan: &Plan, seeds: u32, lines: Vec<CorruptionLine>, bound: [f64; COMPARED]) -> Self {
+    pub(super) fn new(
+        plan: &ExperimentPlan,
+        seeds: u32,
+        lines: Vec<CorruptionLine>,
+        bound: [f64; COMPARED],
+    ) -> Self {
         let identified: usize = lines.iter().map(|l| l.identified).sum();
         let false_identifications: usize = lines.iter().map(|l| l.false_identifications).sum();
         let mut broken = Vec::new();
@@ -310,9 +309,7 @@ impl Corruptions {
             }
         }
         Self {
-            participants: plan.participants.clone(),
-            probe_nm: plan.probe_nm,
-            seed: plan.seed,
+            plan: plan.clone(),
             seeds,
             lines,
             identified,

@@ -8,7 +8,7 @@ use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario};
 use haptic_sim::simulation;
 use haptic_vectorised::{Event, Options};
 
-use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, chosen, path_of};
+use super::{ExperimentPlan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, chosen, path_of};
 use crate::Away;
 use crate::error::StudyError;
 use crate::vectorised::{Checked, Group, in_groups};
@@ -22,7 +22,10 @@ pub(crate) struct Driven {
 }
 
 /// The guided drives of a plan, each participant so often: number, driver, and what counts on from the plan's seed.
-pub(super) fn guided(plan: &Plan, drives: u32) -> Result<Vec<(u32, PublishedDriver, u64)>, StudyError> {
+pub(super) fn guided(
+    plan: &ExperimentPlan,
+    drives: u32,
+) -> Result<Vec<(u32, PublishedDriver, u64)>, StudyError> {
     let chosen = chosen(&plan.participants)?;
     let of = |p: &Participant| {
         let (number, driver) = (p.number, p.guided);
@@ -32,13 +35,17 @@ pub(super) fn guided(plan: &Plan, drives: u32) -> Result<Vec<(u32, PublishedDriv
 }
 
 /// Lets a published driver drive alone, with a remnant and the paper's sensors.
-pub(super) fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, StudyError> {
+pub(super) fn driven(
+    plan: &ExperimentPlan,
+    number: u32,
+    truth: &PublishedDriver,
+) -> Result<Driven, StudyError> {
     driven_by(plan, number, truth, truth.parameters())
 }
 
 /// The same, by a driver who differs from the published one in what the log does not name.
 pub(super) fn driven_by(
-    plan: &Plan,
+    plan: &ExperimentPlan,
     number: u32,
     truth: &PublishedDriver,
     driver: DriverParameters,
@@ -48,7 +55,7 @@ pub(super) fn driven_by(
 
 /// What a published driver drives with a remnant and the paper's sensors.
 pub(super) fn scenario_of_drive(
-    plan: &Plan,
+    plan: &ExperimentPlan,
     number: u32,
     truth: &PublishedDriver,
     driver: DriverParameters,
@@ -180,7 +187,7 @@ pub(crate) fn guided_drive(
 }
 
 /// The drive of a published driver, without remnant.
-fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, StudyError> {
+fn scenario_of(plan: &ExperimentPlan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, StudyError> {
     let condition = match driver.k_hg {
         Some(_) => Condition::Custom,
         None => Condition::Manual,
@@ -207,7 +214,7 @@ mod tests {
     /// and probe, and where a run is rejected.
     #[test]
     fn a_log_does_not_depend_on_lanes() {
-        let plan = |probe_nm| Plan {
+        let plan = |probe_nm| ExperimentPlan {
             participants: vec![2, 9],
             probe_nm,
             seed: 3,

@@ -7,7 +7,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 use super::changing::{Changed, DriverChanges, driven_changing};
 use super::drives::scenario_of_drive;
-use super::{Plan, PublishedDriver};
+use super::{ExperimentPlan, PublishedDriver};
 use crate::error::StudyError;
 
 /// What changes.
@@ -154,7 +154,7 @@ impl Drawn {
     ///
     /// # Errors
     /// A driver that no scenario takes.
-    pub(super) fn log(&self, plan: &Plan, number: u32) -> Result<DriveLog, StudyError> {
+    pub(super) fn log(&self, plan: &ExperimentPlan, number: u32) -> Result<DriveLog, StudyError> {
         let scenario = scenario_of_drive(plan, number, &self.first, self.first.parameters())?;
         let host = |time_s: f64| Action {
             authority: (self.kind == Kind::Authority && time_s >= self.at_s).then_some(0.4),

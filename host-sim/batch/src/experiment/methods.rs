@@ -8,10 +8,10 @@ use haptic_analysis::identify::{Identification, Options, identify_as_published, 
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::ExperimentPlan;
 use super::corruption::{Corruption, POPULATION, corrupted_log};
-use super::drives::driven;
+use super::drives::{driven, guided};
 use super::repetitions::{COMPARED, bound_of, compared};
-use super::{Plan, chosen};
 use crate::error::StudyError;
 
 /// The ways.
@@ -37,12 +37,9 @@ pub struct MethodLine {
 /// All ways on all levels of noise.
 #[derive(Debug, Clone, Serialize)]
 pub struct Methods {
-    /// Numbers of the participants.
-    pub participants: Vec<u32>,
-    /// Amplitude of the probe, N.m.
-    pub probe_nm: f64,
-    /// Seed of the first drive of each participant; the others count on from it.
-    pub seed: u64,
+    /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
+    #[serde(flatten)]
+    pub plan: ExperimentPlan,
     /// Drives of each participant.
     pub seeds: u32,
     /// By noise and way.
@@ -53,12 +50,8 @@ pub struct Methods {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
-    let drivers = chosen(&plan.participants)?;
-    let jobs: Vec<_> = drivers
-        .iter()
-        .flat_map(|p| (0..u64::from(seeds)).map(move |s| (p.number, p.guided, s)))
-        .collect();
+pub fn methods(plan: &ExperimentPlan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
+    let jobs = guided(plan, seeds)?;
     let noises: Vec<(&'static str, &[Corruption])> = POPULATION
         .iter()
         .filter(|(_, ways)| matches!(ways, [] | [Corruption::LaneNoise(..)]))
@@ -67,10 +60,7 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Method
     let found = jobs
         .into_par_iter()
         .map(|(number, truth, seed)| {
-            let plan = Plan {
-                seed: plan.seed.wrapping_add(seed),
-                ..plan.clone()
-            };
+            let plan = plan.repetition(seed);
             let log = driven(&plan, number, &truth)?.log;
             let bound = bound_of(&log, &truth);
             let values: Vec<_> = noises
@@ -128,9 +118,7 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Method
         }
     }
     Ok(Methods {
-        participants: plan.participants.clone(),
-        probe_nm: plan.probe_nm,
-        seed: plan.seed,
+        plan: plan.clone(),
         seeds,
         lines,
     })

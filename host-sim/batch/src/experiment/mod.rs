@@ -63,14 +63,24 @@ pub const REMNANT_GUIDED_NM: f64 = 0.072;
 pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];
 
 /// What to do.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExperimentPlan {
     /// Numbers of the participants, 1 to 14.
     pub participants: Vec<u32>,
     /// Amplitude of the probe in the guided drives, N.m; zero for none.
     pub probe_nm: f64,
     /// Seed of the remnants.
     pub seed: u64,
+}
+
+impl ExperimentPlan {
+    /// The drives of a repetition, from 0: other remnants.
+    fn repetition(&self, number: u64) -> Self {
+        Self {
+            seed: self.seed.wrapping_add(number),
+            ..self.clone()
+        }
+    }
 }
 
 /// What a study of drivers with a known truth found.
@@ -134,7 +144,7 @@ pub struct Finding {
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
+pub fn experiment(plan: &ExperimentPlan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
     let drives: Vec<_> = chosen(&plan.participants)?
         .into_iter()
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])

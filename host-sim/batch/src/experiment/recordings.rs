@@ -16,7 +16,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 
-use super::Plan;
+use super::ExperimentPlan;
 use super::corruptions::{CorruptionLine, Corruptions, Held};
 use super::drives::{guided, scenario_of_drive};
 use super::repetitions::{COMPARED, Compared, compared};
@@ -99,14 +99,18 @@ pub const CHANNELS: [(&str, Channel); 9] = [
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn recordings(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Corruptions, StudyError> {
+pub fn recordings(
+    plan: &ExperimentPlan,
+    seeds: u32,
+    done: impl Fn() + Sync,
+) -> Result<Corruptions, StudyError> {
     let layout = Layout::named("openlka")?;
     let jobs = guided(plan, seeds)?;
     let found = jobs
         .into_par_iter()
         .map(|(number, truth, seed)| {
             let drive = |probe_nm| {
-                let plan = Plan {
+                let plan = ExperimentPlan {
                     seed: plan.seed.wrapping_add(seed),
                     probe_nm,
                     ..plan.clone()

@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::drives::{guided, log_each, scenario_of_drive};
-use super::{Plan, PublishedDriver, truth_of};
+use super::{ExperimentPlan, PublishedDriver, truth_of};
 use crate::error::StudyError;
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
@@ -62,25 +62,26 @@ pub struct Repeated {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<Repetitions, StudyError> {
+pub fn repeat(
+    plan: &ExperimentPlan,
+    repetitions: u32,
+    done: impl Fn() + Sync,
+) -> Result<Repetitions, StudyError> {
     let jobs = guided(plan, repetitions)?;
-    let found: Vec<Judged> = log_each(
+    let found: Vec<DriveResult> = log_each(
         &jobs,
         plan.seed,
         |(number, truth, repetition)| {
-            let plan = Plan {
-                seed: plan.seed.wrapping_add(*repetition),
-                ..plan.clone()
-            };
+            let plan = plan.repetition(*repetition);
             scenario_of_drive(&plan, *number, truth, truth.parameters())
         },
         |driven, (_, truth, _)| {
             let identification = identify_with_noise_model(&driven.log, &Options::default());
             done();
-            Judged::new(truth, &identification, bound_of(&driven.log, truth))
+            DriveResult::new(truth, &identification, bound_of(&driven.log, truth))
         },
     )?;
-    let lines = |participant: Option<u32>, drives: &[Judged]| {
+    let lines = |participant: Option<u32>, drives: &[DriveResult]| {
         (0..COMPARED)
             .filter(|_| !drives.is_empty())
             .map(|i| Repeated::new(participant, i, drives))
@@ -102,13 +103,13 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
 }
 
 /// What was made of one drive.
-struct Judged {
+struct DriveResult {
     values: [Compared; COMPARED],
     bound: [f64; COMPARED],
     held_at_t_nms: [bool; COMPARED],
 }
 
-impl Judged {
+impl DriveResult {
     fn new(truth: &PublishedDriver, found: &Identification, bound: [f64; COMPARED]) -> Self {
         let values = compared(truth, &found.parameters);
         let held = |(name, p, truth): Compared| {
@@ -150,7 +151,7 @@ pub(super) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared
 
 impl Repeated {
     /// Of at least one drive.
-    fn new(participant: Option<u32>, i: usize, judged: &[Judged]) -> Self {
+    fn new(participant: Option<u32>, i: usize, judged: &[DriveResult]) -> Self {
         let drives: Vec<Compared> = judged.iter().map(|j| j.values[i]).collect();
         let bound = judged.iter().map(|j| j.bound[i].powi(2)).sum::<f64>() / judged.len() as f64;
         let at_t_nms = judged.iter().filter(|j| j.held_at_t_nms[i]).count();

@@ -187,7 +187,7 @@ pub(super) fn fed(rows: &Rows, feed: Feed, file: &str) -> Fed {
         let asked = Torque::from_nm(senders.value(&rows.guidance_nm, time_s));
         let out = ecu.step_with_law(now, asked);
         let _ = ecu.background_step();
-        watch.hear(time_s, Some(&out.guidance));
+        watch.take_frame(time_s, Some(&out.guidance));
         let part = usize::from(rows.shared[senders.row]);
         steps[part] += 1;
         if watch.reported.mode == Mode::Active {
@@ -248,7 +248,7 @@ pub(super) fn together<'a>(recordings: impl Iterator<Item = &'a [Fed]> + Clone) 
                 let is_of = |end: &&End| {
                     usize::from(end.shared) == part && name.is_none_or(|name| name == end.faults)
                 };
-                Rate::of(ends.iter().filter(is_of).count() as u64, guided_h[part])
+                Rate::new(ends.iter().filter(is_of).count() as u64, guided_h[part])
             }),
         };
         let mut causes: Vec<Ending> = names.iter().map(|name| ending(Some(name))).collect();

@@ -35,7 +35,7 @@ pub(super) struct Felt {
 }
 
 impl Felt {
-    pub(super) fn of(rows: &Rows) -> Self {
+    pub(super) fn new(rows: &Rows) -> Self {
         let mut found = Self {
             seconds: [0; 2],
             felt: [[0; 2]; TRIED],
@@ -130,7 +130,7 @@ pub struct Threshold {
 
 impl Hands {
     /// Of all recordings; none of none.
-    pub(super) fn of(found: &[&(Felt, Vec<Fed>)]) -> Option<Self> {
+    pub(super) fn new(found: &[&(Felt, Vec<Fed>)]) -> Option<Self> {
         let felt: Vec<&Felt> = found.iter().map(|(felt, _)| felt).collect();
         let (seconds, shares) = shares(&felt)?;
         let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);

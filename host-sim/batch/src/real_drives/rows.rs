@@ -29,7 +29,7 @@ pub(super) struct Rows {
 
 impl Rows {
     /// The rows of a file; none where it is refused as a whole, or lacks what is asked.
-    pub(super) fn of(layout: &Layout, bytes: &[u8], format: Option<Format>) -> Option<Self> {
+    pub(super) fn read(layout: &Layout, bytes: &[u8], format: Option<Format>) -> Option<Self> {
         let (time_s, mut table) = layout.signals(bytes, format, &[]).ok()?;
         let yaw = table.remove("yaw_angle_rad");
         let mut column = |name: &str| table.remove(name);

@@ -44,7 +44,7 @@ pub const NEAR: f64 = 0.15;
 
 /// What to do.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct ReliancePlan {
     /// Numbers of the participants, 1 to 14.
     pub participants: Vec<u32>,
     /// Drives of each participant, each with a seed of its own.
@@ -140,14 +140,14 @@ pub struct Example {
 }
 
 /// An estimate with its deviation and the truth.
-type Point = ([f64; 2], f64);
+type EstimateAndTruth = ([f64; 2], f64);
 
 /// A drive's contribution.
 struct Drive {
     /// Estimates of a steady drive at each of [`TIMES_S`].
-    steady: [Vec<Point>; TIMES_S.len()],
+    steady: [Vec<EstimateAndTruth>; TIMES_S.len()],
     /// Estimate of a changing drive, and by how much the truth changed.
-    changed: Option<(Point, f64)>,
+    changed: Option<(EstimateAndTruth, f64)>,
     limited_steps: [u64; 2],
     diverged: u32,
     left_by_itself: u32,
@@ -159,7 +159,7 @@ struct Drive {
 ///
 /// # Errors
 /// A participant or a parameter of the probe that is out of range.
-pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults, StudyError> {
+pub fn study(plan: &ReliancePlan, progress: impl Fn() + Sync) -> Result<RelianceResults, StudyError> {
     let all = participants();
     let chosen: Vec<usize> = plan
         .participants
@@ -185,7 +185,8 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults,
 
     let accuracy = |drives: &[Drive]| -> Vec<Accuracy> {
         let at = |(i, &after_s): (usize, &f64)| {
-            let points: Vec<Point> = drives.iter().flat_map(|d| d.steady[i].iter().copied()).collect();
+            let points: Vec<EstimateAndTruth> =
+                drives.iter().flat_map(|d| d.steady[i].iter().copied()).collect();
             Accuracy::new(after_s, &points)
         };
         TIMES_S.iter().enumerate().filter_map(at).collect()
@@ -222,7 +223,12 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults,
 }
 
 /// One steady and one changing drive of a participant.
-fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Result<Drive, StudyError> {
+fn both_drives(
+    plan: &ReliancePlan,
+    all: &[Participant],
+    place: usize,
+    seed: u32,
+) -> Result<Drive, StudyError> {
     let mut result = Drive {
         steady: Default::default(),
         changed: None,
@@ -296,7 +302,7 @@ fn run(scenario: &Scenario, session_s: f64, result: &mut Drive) -> Readings {
     readings
 }
 
-fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Result<Scenario, StudyError> {
+fn scenario(plan: &ReliancePlan, participant: &Participant, seed: u32) -> Result<Scenario, StudyError> {
     let driver = participant.guided;
     let mut guidance = GuidanceParameters::default();
     guidance.controller.probe_amplitude_nm = plan.amplitude_nm;
@@ -316,9 +322,9 @@ fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Result<Scenari
 
 impl Accuracy {
     /// None without any estimate.
-    fn new(after_s: f64, points: &[Point]) -> Option<Self> {
+    fn new(after_s: f64, points: &[EstimateAndTruth]) -> Option<Self> {
         let count = points.len();
-        let mean = |f: &dyn Fn(&Point) -> f64| points.iter().map(f).sum::<f64>() / count as f64;
+        let mean = |f: &dyn Fn(&EstimateAndTruth) -> f64| points.iter().map(f).sum::<f64>() / count as f64;
         let within = |deviations: f64| {
             mean(&|([estimate, deviation], truth)| {
                 f64::from(u8::from((estimate - truth).abs() <= deviations * deviation))
@@ -339,7 +345,7 @@ impl Accuracy {
 impl Settling {
     fn new(drives: &[Drive]) -> Self {
         let changes: Vec<_> = drives.iter().filter_map(|d| d.changed).collect();
-        let error = |(([estimate, _], truth), _): &(Point, f64)| (estimate - truth).abs();
+        let error = |(([estimate, _], truth), _): &(EstimateAndTruth, f64)| (estimate - truth).abs();
         let near = |large: bool| {
             let of = changes.iter().filter(|c| !large || c.1.abs() > 0.3);
             let all = of.clone().count();

@@ -1,19 +1,18 @@
 //! A study file, checked: every session's scenario is built before anything is driven.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
-use haptic_sim::input::{InputError, RangeError, in_range, parse_toml};
-use haptic_sim::models::road::Course;
+use haptic_sim::input::{InputError, RangeError, parse_toml};
 use haptic_sim::participants::participant;
 use haptic_sim::scenario::{FailureKind, Scenario};
 use haptic_sim::seeds::named;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{Order, Session, Study, Who};
+use super::{Order, Session, Study, Subject};
 use crate::error::{StudyError, refuse};
 use crate::experiment::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
+use crate::files::{Source, one};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -49,43 +48,27 @@ struct ParticipantFile {
     person: bool,
 }
 
-fn one() -> u64 {
-    1
-}
-
 /// Most times that a participant drives under each condition.
-const MOST_REPETITIONS: u64 = 100;
+const MOST_REPETITIONS: f64 = 100.0;
 /// Longest name: it becomes the name of a directory.
 const LONGEST_NAME: usize = 40;
 
-pub(super) fn load(path: &Path) -> Result<Study, InputError> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
-    from_text(&name, &text, path.parent().unwrap_or(Path::new("")))
-}
-
-pub(super) fn from_text(source: &str, text: &str, folder: &Path) -> Result<Study, InputError> {
-    let file: StudyFile = parse_toml(source, text)?;
-    let named = |error: StudyError| InputError::new(source, error);
+pub(super) fn from_text(source: &Source, text: &str) -> Result<Study, InputError> {
+    let file: StudyFile = parse_toml(&source.name, text)?;
+    let named = |error: StudyError| source.bad(error);
     check_names("study", [&file.name]).map_err(named)?;
     check_names("condition", file.condition.iter().map(|c| &c.name)).map_err(named)?;
     check_names("participant", file.participant.iter().map(|p| &p.name)).map_err(named)?;
-    let repetitions = in_range(
-        "repetitions",
-        file.repetitions as f64,
-        1.0..=MOST_REPETITIONS as f64,
-        "",
-    );
-    repetitions.map_err(|e| named(e.into()))?;
+    let repetitions = source.count("repetitions", file.repetitions, 1.0, MOST_REPETITIONS)?;
     let rows = file.order.rows(file.condition.len());
     let mut sessions = Vec::new();
     for (number, participant) in file.participant.iter().enumerate() {
         // Each repetition is a block with every condition once, in the next order.
-        for block in 0..file.repetitions as usize {
+        for block in 0..repetitions as usize {
             let order = &rows[(number + block) % rows.len()];
             for (place, condition) in order.iter().enumerate() {
                 let condition = &file.condition[*condition];
-                let session = session(source, &file, participant, condition, block + 1, folder)?;
+                let session = session(source, &file, participant, condition, block + 1)?;
                 sessions.push(Session {
                     position: block * order.len() + place + 1,
                     ..session
@@ -134,16 +117,15 @@ pub(crate) fn check_names<'a>(
 
 /// The session of a participant under a condition, in the first place.
 fn session(
-    source: &str,
+    source: &Source,
     file: &StudyFile,
     participant: &ParticipantFile,
     condition: &ConditionFile,
     repetition: usize,
-    folder: &Path,
 ) -> Result<Session, InputError> {
     let here = format!(
-        "{source}: participant {}, condition {}",
-        participant.name, condition.name
+        "{}: participant {}, condition {}",
+        source.name, participant.name, condition.name
     );
     let bad = |message: String| InputError::new(&here, message);
     let mut fields = file.scenario.clone();
@@ -154,22 +136,19 @@ fn session(
         ));
     }
     let manual = fields.get("condition").and_then(Value::as_str) == Some("manual");
+    let mut put_driver = |driver| {
+        let driver = Table::from_iter([("driver".into(), Value::Table(driver))]);
+        merge(&mut fields, &driver);
+    };
     let who = match (participant.published, &participant.driver, participant.person) {
-        (None, None, true) => Who::Person,
+        (None, None, true) => Subject::Person,
         (Some(number), None, false) => {
-            let mut driver = Table::new();
-            driver.insert(
-                "driver".into(),
-                Value::Table(of_published(number, manual).map_err(|e| bad(e.to_string()))?),
-            );
-            merge(&mut fields, &driver);
-            Who::Simulated
+            put_driver(of_published(number, manual).map_err(|e| bad(e.to_string()))?);
+            Subject::Simulated
         }
         (None, Some(given), false) => {
-            let mut driver = Table::new();
-            driver.insert("driver".into(), Value::Table(given.clone()));
-            merge(&mut fields, &driver);
-            Who::Simulated
+            put_driver(given.clone());
+            Subject::Simulated
         }
         _ => return Err(bad("one of published, driver and person = true is wanted".into())),
     };
@@ -181,13 +160,10 @@ fn session(
     } >> 11;
     fields.insert("seed".into(), Value::Integer(seed as i64));
     let scenario = Scenario::from_toml(&here, &fields.to_string(), |course, lane| {
-        let path = folder.join(course);
-        let bytes = std::fs::read(&path).map_err(|e| InputError::new(path.display(), e))?;
-        // By the name in the file: from where the command was called is no part of a session.
-        Course::from_text(course, &String::from_utf8_lossy(&bytes), lane)
+        source.course(course, lane)
     })?;
     scenario.check_times().map_err(|e| bad(e.to_string()))?;
-    if who == Who::Person && scenario.failure().kind != FailureKind::None {
+    if who == Subject::Person && scenario.failure().kind != FailureKind::None {
         return Err(bad(
             "failure: a person's recording does not say when it came; only simulated \
                         participants can have one"

@@ -29,6 +29,7 @@ pub(crate) use paired::interval_of_mean;
 pub use paired::{Difference, of_participants};
 
 use crate::error::{StudyError, refuse};
+use crate::files;
 use crate::left_by_themselves;
 use crate::record::RunRecord;
 use crate::vectorised::run_all;
@@ -49,7 +50,7 @@ pub struct Study {
 /// Who drives a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Who {
+pub enum Subject {
     /// A driver model.
     Simulated,
     /// Somebody, recorded elsewhere.
@@ -78,7 +79,7 @@ pub struct Session {
     /// Which time it is that the participant drives under the condition, from 1.
     pub repetition: usize,
     /// Who drives.
-    pub who: Who,
+    pub who: Subject,
     /// Everything that decides it. Of a person it says road, speed and guidance, and the driver is not meant.
     pub scenario: Scenario,
 }
@@ -95,7 +96,7 @@ pub struct SessionResult {
     /// Which time it is that the participant drives under the condition, from 1.
     pub repetition: usize,
     /// Who drives.
-    pub who: Who,
+    pub who: Subject,
     /// Of all random numbers.
     pub seed: u64,
     /// What was recorded; nothing if it is missing.
@@ -156,7 +157,8 @@ impl Study {
     /// # Errors
     /// The file, the participant and the condition, the field, its value and its range.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        file::load(path)
+        let (source, text) = files::Source::open(path)?;
+        file::from_text(&source, &text)
     }
 
     /// Keeps a person's recording. `what` is `PARTICIPANT/CONDITION`, with `/2` and so on from the second repetition on.
@@ -169,7 +171,7 @@ impl Study {
             let names: Vec<String> = self
                 .sessions
                 .iter()
-                .filter(|s| s.who == Who::Person)
+                .filter(|s| s.who == Subject::Person)
                 .map(Session::name)
                 .collect();
             return refuse(format!(
@@ -177,7 +179,7 @@ impl Study {
                 names.join(", ")
             ));
         };
-        if session.who != Who::Person {
+        if session.who != Subject::Person {
             return refuse(format!("{what}: this participant is simulated"));
         }
         let place = store::place(out, session);
@@ -212,7 +214,7 @@ impl Study {
         let mut missing = Vec::new();
         for session in &self.sessions {
             let there = store::read(self, session, out)?.is_some();
-            if !there && session.who == Who::Simulated {
+            if !there && session.who == Subject::Simulated {
                 missing.push(session);
             }
         }

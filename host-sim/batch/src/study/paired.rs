@@ -1,8 +1,9 @@
-//! How much two conditions differ, participant by participant.
+//! Differences between two conditions within participants.
 //!
-//! Each participant has one value under each condition: the mean over the repetitions. The differences of those who have both
-//! are taken as normal: their mean has Student's interval, and the *effect size* d_z is the mean over the standard deviation
-//! of the differences (Lakens 2013, Front. Psychol. 4:863).
+//! Each participant has one value under each condition: the mean over the repetitions. The differences of the
+//! participants who have both values are assumed to be normally distributed. Their mean gets Student's interval; the
+//! *effect size* d_z is the mean divided by the standard deviation of the differences (Lakens 2013, Front. Psychol.
+//! 4:863).
 
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use serde::Serialize;
@@ -17,7 +18,7 @@ pub struct Difference {
     pub metric: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// The condition whose value is taken off.
+    /// The condition whose value is subtracted.
     pub from: String,
     /// The other one.
     pub to: String,
@@ -31,8 +32,8 @@ pub struct Difference {
     pub effect_size: Option<f64>,
 }
 
-/// What each participant drives under a condition, as listed: the mean over the repetitions that did not leave the road; none of
-/// who has none.
+/// The value of each participant under a condition, in the order of the sessions: the mean over the repetitions that
+/// stayed on the road, `None` without one.
 #[must_use]
 pub fn of_participants(sessions: &[SessionResult], condition: &str, metric: &Definition) -> Vec<Option<f64>> {
     let of_one = |own: &[SessionResult]| {
@@ -47,7 +48,7 @@ pub fn of_participants(sessions: &[SessionResult], condition: &str, metric: &Def
     each.map(of_one).collect()
 }
 
-/// Every pair of conditions, the earlier taken off the later, in every metric that has values.
+/// The differences of every pair of conditions, later minus earlier, in every metric that has values.
 pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> Vec<Difference> {
     let mut all = Vec::new();
     for (place, from) in conditions.iter().enumerate() {

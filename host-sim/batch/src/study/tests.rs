@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::*;
+use crate::files;
 
 const STUDY: &str = r#"
 name = "reliance"
@@ -12,15 +13,8 @@ seed = 7
 speed_m_per_s = 16.666666666666668
 [scenario.course]
 name = "one curve"
-lane_width = 3.6
-[[scenario.course.segment]]
-length = 100.0
-curvature_start = 0.0
-curvature_end = 0.0
-[[scenario.course.segment]]
-length = 200.0
-curvature_start = 0.003
-curvature_end = 0.003
+lane_width_m = 3.6
+segment = [{ length_m = 100.0 }, { length_m = 200.0, curvature_per_m = 0.003 }]
 [[condition]]
 name = "manual"
 scenario = { condition = "manual" }
@@ -39,7 +33,7 @@ person = true
 "#;
 
 fn study(text: &str) -> Result<Study, String> {
-    file::from_text("study.toml", text, Path::new("")).map_err(|e| e.to_string())
+    file::from_text(&files::Source::new("study.toml", Path::new("")), text).map_err(|e| e.to_string())
 }
 
 #[test]

@@ -6,7 +6,7 @@ use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::{Run, simulate};
 
-use super::{Chunk, Point, Sweep};
+use super::{Chunk, DesignPoint, Sweep};
 use crate::record::{default_window, nominal_peak_m};
 use crate::{Away, RunRecord};
 
@@ -28,7 +28,7 @@ impl Sweep {
     ///
     /// # Errors
     /// As [`Sweep::scenario`].
-    pub fn drive(&self, point: &Point) -> Result<Driven, InputError> {
+    pub fn drive(&self, point: &DesignPoint) -> Result<Driven, InputError> {
         self.run_alone(&self.scenario(point)?)
     }
 

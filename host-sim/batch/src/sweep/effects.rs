@@ -9,7 +9,7 @@ use haptic_analysis::metrics::Definition;
 use serde::Serialize;
 
 use super::groups::{CONFIDENCE, Drives, Group, Moments, share_between, student};
-use super::{Driven, Point, SLICES, Sweep, units, value};
+use super::{DesignPoint, Driven, SLICES, Sweep, units, value};
 
 /// Whether a small value of a metric is the bad one.
 pub(super) fn small_is_bad(metric: &Definition) -> bool {
@@ -115,7 +115,7 @@ impl Effects {
             column += axis.columns.len();
             Axis {
                 field: axis.columns[0].name.clone(),
-                unit: units::of(&axis.columns[0]),
+                unit: units::unit_of_column(&axis.columns[0]),
                 column: first,
                 rows,
                 exact: of_list.is_some_and(|rows| rows <= MOST_LEVELS),
@@ -141,7 +141,7 @@ impl Effects {
     }
 
     /// Drives come in the order of their numbers.
-    pub(super) fn add(&mut self, point: &Point, driven: &Driven, is_beyond: bool) {
+    pub(super) fn add(&mut self, point: &DesignPoint, driven: &Driven, is_beyond: bool) {
         if point.sample != self.sample {
             self.end_sample();
             self.sample = point.sample;
@@ -388,7 +388,7 @@ mod tests {
     }
 
     /// Effects of a sweep whose drives have these peaks; none: it diverged.
-    fn effects_of(text: &str, vary: &str, peak: impl Fn(&Point) -> Option<f64>) -> Vec<Effect> {
+    fn effects_of(text: &str, vary: &str, peak: impl Fn(&DesignPoint) -> Option<f64>) -> Vec<Effect> {
         let text = format!("metrics = [\"peak_lateral_error_m\"]\n{text}");
         let sweep = crate::sweep::tests::with_road(&text, vary);
         let mut effects = Effects::new(&sweep, 0);
@@ -417,7 +417,7 @@ mod tests {
     /// is 2.093 times sqrt(1.0526 / 20), Student's quantile of 19 degrees.
     #[test]
     fn values_are_compared_sample_by_sample() {
-        let base = |point: &Point| 2.0 * (point.sample % 2) as f64;
+        let base = |point: &DesignPoint| 2.0 * (point.sample % 2) as f64;
         let better = [0.1, 0.0, 0.2];
         let found = effects_of("samples = 20\n", TWO_FIELDS, |point| {
             Some(base(point) + better[point.levels[0] as usize])

@@ -94,7 +94,7 @@ pub struct Sweep {
 
 /// What is varied in a drive.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct DesignPoint {
     /// Number of the drive, from 0.
     pub drive: u64,
     /// Its scenario's seed.

@@ -5,8 +5,8 @@ use std::io;
 
 use super::axis::Kind as AxisKind;
 use super::table::header;
-use super::{Driven, Point, Sweep, value};
-use crate::parquet::{Cell, Column, Table};
+use super::{DesignPoint, Driven, Sweep, value};
+use crate::parquet::{Cell, ParquetColumn, Table};
 
 pub(super) struct ParquetTable {
     table: Table,
@@ -27,7 +27,7 @@ impl ParquetTable {
         })
     }
 
-    pub(super) fn row(&mut self, point: &Point, driven: &Driven) -> io::Result<()> {
+    pub(super) fn row(&mut self, point: &DesignPoint, driven: &Driven) -> io::Result<()> {
         let numbers = [
             Cell::Whole(point.drive),
             Cell::Whole(point.seed),
@@ -73,12 +73,15 @@ fn of_texts(sweep: &Sweep) -> Vec<bool> {
 }
 
 /// Empty columns in the order of [`header`].
-fn columns(sweep: &Sweep, of_texts: &[bool]) -> Vec<Column> {
-    let (number, text) = (|| Column::Number(Vec::new()), || Column::Text(Vec::new()));
-    let whole = || Column::Whole(Vec::new());
+fn columns(sweep: &Sweep, of_texts: &[bool]) -> Vec<ParquetColumn> {
+    let (number, text) = (
+        || ParquetColumn::Number(Vec::new()),
+        || ParquetColumn::Text(Vec::new()),
+    );
+    let whole = || ParquetColumn::Whole(Vec::new());
     let mut columns = vec![whole(), whole(), text()];
     columns.extend(of_texts.iter().map(|is| if *is { text() } else { number() }));
-    columns.extend([Column::Flag(Vec::new()), number()]);
+    columns.extend([ParquetColumn::Flag(Vec::new()), number()]);
     columns.extend([number(), text(), number(), number()]);
     columns.extend(sweep.metrics().iter().map(|_| number()));
     columns

@@ -6,14 +6,14 @@ use haptic_sim::seeds::{self, Stream};
 use toml::Value;
 
 use super::axis::Kind;
-use super::{Design, MOST_DRIVES, Point, SLICES, Sweep, value};
+use super::{Design, DesignPoint, MOST_DRIVES, SLICES, Sweep, value};
 use crate::error::StudyError;
 
 impl Sweep {
     /// What is varied in a drive. Repeats follow each other, then the grid (its last axis first), then the mixtures of
     /// Saltelli's design, then the samples. All of a sample's drives share its values, and its repeats' seeds: what is
     /// compared meets the same chance.
-    pub fn point(&self, drive: u64) -> Point {
+    pub fn point(&self, drive: u64) -> DesignPoint {
         let (repeat, rest) = (drive % self.repeats, drive / self.repeats);
         let (mut grid, rest) = (rest % self.grid_points(), rest / self.grid_points());
         let (role, sample) = (rest % self.places.roles(), rest / self.places.roles());
@@ -42,7 +42,7 @@ impl Sweep {
         // 53 bits, so that a table's number holds it.
         let drawn = seeds::nth(Stream::Drives.seed(self.seed), sample * self.repeats + repeat) >> 11;
         let seed = own.and_then(|seed| u64::try_from(seed).ok()).unwrap_or(drawn);
-        Point {
+        DesignPoint {
             drive,
             seed,
             values,
@@ -53,7 +53,7 @@ impl Sweep {
     }
 
     /// The text of a drive's scenario.
-    fn scenario_text(&self, point: &Point) -> Result<String, StudyError> {
+    fn scenario_text(&self, point: &DesignPoint) -> Result<String, StudyError> {
         let mut table = self.scenario.clone();
         table.insert("seed".into(), Value::Integer(point.seed as i64));
         let columns = || self.axes().flat_map(|axis| &axis.columns);
@@ -84,7 +84,7 @@ impl Sweep {
     ///
     /// # Errors
     /// A value out of range, with the drive's number and what is varied in it; an instant behind the end of the run.
-    pub fn scenario(&self, point: &Point) -> Result<Scenario, InputError> {
+    pub fn scenario(&self, point: &DesignPoint) -> Result<Scenario, InputError> {
         let scenario = self
             .scenario_text(point)
             .map_err(|e| InputError::new(&self.name, e))
@@ -174,7 +174,7 @@ impl Sweep {
         Ok(())
     }
 
-    fn check_at(&self, point: &Point) -> Result<(), InputError> {
+    fn check_at(&self, point: &DesignPoint) -> Result<(), InputError> {
         let scenario = self.scenario(point)?;
         let Some(window) = self.window else { return Ok(()) };
         crate::check_window(window, &scenario).map_err(|e| InputError::new(&self.name, e))

@@ -11,14 +11,12 @@ use toml::{Table, Value};
 use super::axis::Kind;
 use super::file::SweepFile;
 use super::value;
-use crate::files::load_lane;
+use crate::files::{self, Source, load_lane};
 
 /// Reads a sweep file and all that it names.
 pub(super) fn read(path: &Path) -> Result<String, InputError> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    resolve(&name, &text, folder)
+    let (source, text) = Source::open(path)?;
+    resolve(&source.name, &text, source.folder)
 }
 
 /// The text with what it names in `folder`.
@@ -35,7 +33,8 @@ pub(super) fn resolve(name: &str, text: &str, folder: &Path) -> Result<String, I
                 format!("table {}: either file, or columns and rows", i + 1),
             ));
         }
-        let (columns, rows) = read_table(&folder.join(&path))?;
+        let csv = folder.join(&path);
+        let (columns, rows) = value::read_csv(&csv.display().to_string(), &files::read(&csv)?)?;
         let mut whole = Table::new();
         whole.insert("choice".into(), Value::Boolean(of.choice));
         whole.insert(
@@ -86,8 +85,7 @@ fn base(name: &str, file: &SweepFile, folder: &Path) -> Result<Table, InputError
         (Some(path), None) => Path::new(path),
     };
     let whole = folder.join(path);
-    let text = std::fs::read_to_string(&whole).map_err(|e| InputError::new(whole.display(), e))?;
-    let mut scenario: Table = parse_toml(&whole.display().to_string(), &text)?;
+    let mut scenario: Table = parse_toml(&whole.display().to_string(), &files::read(&whole)?)?;
     if let Some(Value::String(course)) = scenario.get_mut("course")
         && course != PAPER_COURSE
         && let Some(beside) = path.parent()
@@ -95,12 +93,6 @@ fn base(name: &str, file: &SweepFile, folder: &Path) -> Result<Table, InputError
         *course = beside.join(&*course).display().to_string();
     }
     Ok(scenario)
-}
-
-fn read_table(path: &Path) -> Result<(Vec<String>, Vec<Vec<Value>>), InputError> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
-    value::read_csv(&name, &text)
 }
 
 /// Every course that a drive may name.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::effects::{Effects, small_is_bad};
 use super::saltelli::{Blocks, SobolIndex};
-use super::{Design, Driven, Effect, Point, Sweep, value};
+use super::{Design, DesignPoint, Driven, Effect, Sweep, value};
 use crate::Away;
 
 /// Drives that are shown as the worst.
@@ -126,7 +126,7 @@ impl<'a> Summarised<'a> {
         }
     }
 
-    pub(super) fn add(&mut self, point: &Point, driven: &Driven) {
+    pub(super) fn add(&mut self, point: &DesignPoint, driven: &Driven) {
         self.drives += 1;
         self.diverged += u64::from(driven.diverged);
         if let Some(why) = driven.away.guidance_left_why.filter(|why| !why.is_asked_for()) {
@@ -150,7 +150,7 @@ impl<'a> Summarised<'a> {
         self.keep_if_bad(point, driven, judged);
     }
 
-    fn keep_if_bad(&mut self, point: &Point, driven: &Driven, value: Option<f64>) {
+    fn keep_if_bad(&mut self, point: &DesignPoint, driven: &Driven, value: Option<f64>) {
         let sign = if small_is_bad(self.sweep.judge()) {
             -1.0
         } else {

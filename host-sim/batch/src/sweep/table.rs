@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Driven, Point, Sweep, value};
+use super::{DesignPoint, Driven, Sweep, value};
 use crate::Away;
 
 /// Both tables on their way. Without the feature `parquet` there is only the CSV file.
@@ -31,7 +31,7 @@ impl Tables {
         })
     }
 
-    pub(super) fn row(&mut self, point: &Point, driven: &Driven) -> io::Result<()> {
+    pub(super) fn row(&mut self, point: &DesignPoint, driven: &Driven) -> io::Result<()> {
         let numbers = [
             point.drive.to_string(),
             point.seed.to_string(),

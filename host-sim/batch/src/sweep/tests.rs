@@ -12,15 +12,11 @@ use super::*;
 const ROAD: &str = "
 [scenario.course]
 name = \"one curve\"
-lane_width = 3.6
-[[scenario.course.segment]]
-length = 100.0
-curvature_start = 0.0
-curvature_end = 0.0
-[[scenario.course.segment]]
-length = 200.0
-curvature_start = 0.003
-curvature_end = 0.003
+lane_width_m = 3.6
+segment = [
+    { length_m = 100.0, curvature_start_per_m = 0.0, curvature_end_per_m = 0.0 },
+    { length_m = 200.0, curvature_start_per_m = 0.003, curvature_end_per_m = 0.003 },
+]
 ";
 
 fn sweep(text: &str) -> Result<Sweep, String> {
@@ -47,8 +43,8 @@ fn lists_and_ranges_meet_each_other_and_every_sample() {
         sweep.columns().collect::<Vec<_>>(),
         ["driver.t_n_s", "speed_m_per_s", "driver.k_hg"]
     );
-    let points: Vec<Point> = (0..sweep.drives()).map(|drive| sweep.point(drive)).collect();
-    let of = |point: &Point| [0, 1].map(|i| value::text(&point.values[i]));
+    let points: Vec<DesignPoint> = (0..sweep.drives()).map(|drive| sweep.point(drive)).collect();
+    let of = |point: &DesignPoint| [0, 1].map(|i| value::text(&point.values[i]));
     let grid: BTreeSet<[String; 2]> = points.iter().map(of).collect();
     assert_eq!(grid.len(), 6);
     assert!(grid.contains(&["0.2".to_string(), "17".into()]), "{grid:?}");
@@ -83,8 +79,8 @@ fn a_row_is_the_drive_of_the_scenario_that_it_names() {
     );
     let point = sweep.point(1);
     let [t_p, time] = [0, 1].map(|i| value::number(&point.values[i]).unwrap());
-    let course = "[course]\nname = \"one curve\"\nlane_width = 3.6\n[[course.segment]]\nlength = 100.0\ncurvature_start = 0.0\n\
-                  curvature_end = 0.0\n[[course.segment]]\nlength = 200.0\ncurvature_start = 0.003\ncurvature_end = 0.003\n";
+    let course = "[course]\nname = \"one curve\"\nlane_width_m = 3.6\n[[course.segment]]\nlength_m = 100.0\ncurvature_start_per_m = 0.0\n\
+                  curvature_end_per_m = 0.0\n[[course.segment]]\nlength_m = 200.0\ncurvature_start_per_m = 0.003\ncurvature_end_per_m = 0.003\n";
     let text = format!(
         "seed = {}\n[driver]\nt_p_s = {t_p}\n[failure]\nkind = \"torque\"\ntime_s = {time}\n{course}",
         point.seed
@@ -109,7 +105,8 @@ fn a_row_is_the_drive_of_the_scenario_that_it_names() {
 
 #[test]
 fn one_value_may_set_several_fields() {
-    let fields = "fields = [\"course.segment.0.curvature_end\", \"course.segment.1.curvature_start\"]";
+    let fields =
+        "fields = [\"course.segment.0.curvature_end_per_m\", \"course.segment.1.curvature_start_per_m\"]";
     let sweep = with_road(
         "samples = 5\n",
         &format!("[vary]\ncurvature = {{ uniform = [0.001, 0.002], {fields} }}\n"),
@@ -300,8 +297,8 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
         &["failure.time_s = ", "the run ends there"],
     );
     has(
-        vary("\"course.segment.7.length\" = { uniform = [10, 900] }"),
-        &["vary.course.segment.7.length"],
+        vary("\"course.segment.7.length_m\" = { uniform = [10, 900] }"),
+        &["vary.course.segment.7.length_m"],
     );
     has(
         refused("[vary]\nspeed_m_per_s = { uniform = [50, 70] }\n"),

@@ -5,7 +5,7 @@ use haptic_sim::scenario::unit_of;
 use super::axis::Column;
 
 /// The unit of a column's values, `-` if that is 1; none if they are not its fields' values, or the fields have several.
-pub(super) fn of(column: &Column) -> Option<String> {
+pub(super) fn unit_of_column(column: &Column) -> Option<String> {
     if column.times != 1.0 || column.over.is_some() {
         return None;
     }
@@ -32,23 +32,23 @@ mod tests {
             ("driver.t_p_s", Some("s")),
             ("driver.k_hg", Some("-")),
             ("vehicle.b_s_nms_per_rad", Some("N.m.s/rad")),
-            ("course.segment.2.curvature_end", Some("1/m")),
-            ("course.lane_width", Some("m")),
+            ("course.segment.2.curvature_end_per_m", Some("1/m")),
+            ("course.lane_width_m", Some("m")),
             ("no.such", None),
         ] {
-            assert_eq!(of(&column(&[path], 1.0)).as_deref(), unit, "{path}");
+            assert_eq!(unit_of_column(&column(&[path], 1.0)).as_deref(), unit, "{path}");
         }
         assert_eq!(
-            of(&column(&["driver.t_p_s", "driver.t_nms_s"], 1.0)).as_deref(),
+            unit_of_column(&column(&["driver.t_p_s", "driver.t_nms_s"], 1.0)).as_deref(),
             Some("s")
         );
         assert_eq!(
-            of(&column(&["driver.t_p_s", "driver.k_d_nm_per_rad"], 1.0)),
+            unit_of_column(&column(&["driver.t_p_s", "driver.k_d_nm_per_rad"], 1.0)),
             None,
             "two units"
         );
         assert_eq!(
-            of(&column(&["failure.time_s"], 3.6)),
+            unit_of_column(&column(&["failure.time_s"], 3.6)),
             None,
             "a number of the user's own"
         );

@@ -74,7 +74,7 @@ fn truncated(mean: f64, sd: f64, [low, high]: [f64; 2], u: f64) -> f64 {
     (mean + sd * standard.inverse_cdf(from + u * (to - from))).clamp(low, high)
 }
 
-/// Puts a value at a path such as `driver.t_p_s` or `course.segment.1.length`; a table that is missing is made.
+/// Puts a value at a path such as `driver.t_p_s` or `course.segment.1.length_m`; a table that is missing is made.
 ///
 /// # Errors
 /// A part of the path that is neither a table nor a place in a list.
@@ -214,13 +214,13 @@ mod tests {
 
     #[test]
     fn a_path_reaches_tables_and_lists() {
-        let mut table: Table = toml::from_str("[[course.segment]]\nlength = 1.0\n").unwrap();
-        put(&mut table, "course.segment.0.length", Value::Float(2.0)).unwrap();
+        let mut table: Table = toml::from_str("[[course.segment]]\nlength_m = 1.0\n").unwrap();
+        put(&mut table, "course.segment.0.length_m", Value::Float(2.0)).unwrap();
         put(&mut table, "world.mu", Value::Float(0.5)).unwrap();
         put(&mut table, "speed_m_per_s", Value::Integer(50)).unwrap();
-        assert_eq!(table["course"]["segment"][0]["length"].as_float(), Some(2.0));
+        assert_eq!(table["course"]["segment"][0]["length_m"].as_float(), Some(2.0));
         assert_eq!(table["world"]["mu"].as_float(), Some(0.5));
-        let error = put(&mut table, "course.segment.3.length", Value::Float(2.0))
+        let error = put(&mut table, "course.segment.3.length_m", Value::Float(2.0))
             .unwrap_err()
             .to_string();
         assert!(error.contains("list of 1"), "{error}");

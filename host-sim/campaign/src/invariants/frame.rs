@@ -93,7 +93,7 @@ mod tests {
         for code in 0..FAULT_BITS {
             let word = 1_u64 << (37 + code);
             let frame = Frame::new(bytes::GUIDANCE, &word.to_le_bytes()).unwrap();
-            assert_eq!(Status::of(&frame).faults, 1 << code);
+            assert_eq!(Status::decode(&frame).faults, 1 << code);
             assert!(Fault::from_code(code).is_some(), "bit {code}");
         }
     }

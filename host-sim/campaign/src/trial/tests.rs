@@ -13,7 +13,7 @@ use crate::table::rows;
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=60;
 
 fn braking() -> World {
-    World::real(WORLDS.iter().find(|world| world.name == "braking").unwrap())
+    World::of_kind(WORLDS.iter().find(|world| world.name == "braking").unwrap())
 }
 
 fn by_name(name: &str) -> &'static FaultCase {
@@ -255,7 +255,7 @@ fn drivers_change_who_drives_and_nothing_else() {
 /// What runs a failure again says who drove where it is not who usually does.
 #[test]
 fn a_replay_names_world_and_drivers() {
-    let everything = || World::real(WORLDS.iter().find(|world| world.name == "everything").unwrap());
+    let everything = || World::of_kind(WORLDS.iter().find(|world| world.name == "everything").unwrap());
     assert_eq!(World::new().arguments(), "");
     assert_eq!(everything().arguments(), " --world everything");
     assert_eq!(

@@ -3,7 +3,7 @@
 //! Read are data frames of classic CAN (objects 1 and 86); times are since 1970, as python-can gives them, to the
 //! nanosecond. The crate blf_asc is not used: it reads an object of size zero for ever.
 
-use super::bytes::{Bytes, Room};
+use super::bytes::{Budget, Bytes};
 use super::calendar;
 use crate::candump::CandumpFrame;
 use crate::recording::RecordingError;
@@ -36,7 +36,7 @@ pub fn parse(file: &[u8]) -> Result<Vec<CandumpFrame>, RecordingError> {
     let start_ms = calendar::ms(start).unwrap_or(0);
     let mut at = u64::from(bytes.u32(4)?.max(72));
     // Objects may straddle containers, so that their contents are one stream.
-    let (mut stream, mut room) = (Vec::new(), Room::of(file));
+    let (mut stream, mut budget) = (Vec::new(), Budget::new(file));
     while at + OBJECT_HEAD <= file.len() as u64 {
         let (size, kind) = head(bytes, at)?;
         if kind == CONTAINER {
@@ -46,7 +46,7 @@ pub fn parse(file: &[u8]) -> Result<Vec<CandumpFrame>, RecordingError> {
             match method {
                 0 => stream.extend_from_slice(inside),
                 2 => {
-                    let inflated = room.inflated(inside);
+                    let inflated = budget.inflated(inside);
                     stream.extend(inflated.map_err(|e| RecordingError(format!("byte {at}: {e}")))?);
                 }
                 other => return Err(format!("byte {at}: compression {other} is not known").into()),

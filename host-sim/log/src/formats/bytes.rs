@@ -57,13 +57,13 @@ const TIMES: usize = 64;
 const USUAL_VALUES: usize = 20_000_000;
 
 /// What a file may still grow to when it is read. A few bytes can stand for any number of zeros.
-pub(super) struct Room {
+pub(super) struct Budget {
     bytes: usize,
     values: usize,
 }
 
-impl Room {
-    pub(super) fn of(file: &[u8]) -> Self {
+impl Budget {
+    pub(super) fn new(file: &[u8]) -> Self {
         let more = file.len().saturating_mul(TIMES);
         Self {
             bytes: USUAL.saturating_add(more),

@@ -3,7 +3,7 @@
 //! Read are real vectors of any class, plain or compressed, and matrices of a few of them beside each other. The crate matfile is not used: it reads numbers alone, so the
 //! units would be lost.
 
-use super::bytes::{Bytes, Room};
+use super::bytes::{Budget, Bytes};
 use crate::recording::{Group, RecordingError, Series};
 
 const MATRIX: u32 = 14;
@@ -44,7 +44,7 @@ fn element(bytes: Bytes<'_>, at: u64) -> Result<(u32, Bytes<'_>, u64), Recording
 
 /// Numbers of an element, by its type.
 fn numbers(kind: u32, b: Bytes<'_>) -> Vec<f64> {
-    fn of<const N: usize>(b: Bytes<'_>, number: fn([u8; N]) -> f64) -> Vec<f64> {
+    fn each<const N: usize>(b: Bytes<'_>, number: fn([u8; N]) -> f64) -> Vec<f64> {
         b.0.as_chunks::<N>()
             .0
             .iter()
@@ -52,16 +52,16 @@ fn numbers(kind: u32, b: Bytes<'_>) -> Vec<f64> {
             .collect()
     }
     match kind {
-        1 => of::<1>(b, |x| f64::from(i8::from_le_bytes(x))),
-        2 => of::<1>(b, |x| f64::from(x[0])),
-        3 => of(b, |x| f64::from(i16::from_le_bytes(x))),
-        4 => of(b, |x| f64::from(u16::from_le_bytes(x))),
-        5 => of(b, |x| f64::from(i32::from_le_bytes(x))),
-        6 => of(b, |x| f64::from(u32::from_le_bytes(x))),
-        7 => of(b, |x| f64::from(f32::from_le_bytes(x))),
-        9 => of(b, f64::from_le_bytes),
-        12 => of(b, |x| i64::from_le_bytes(x) as f64),
-        13 => of(b, |x| u64::from_le_bytes(x) as f64),
+        1 => each::<1>(b, |x| f64::from(i8::from_le_bytes(x))),
+        2 => each::<1>(b, |x| f64::from(x[0])),
+        3 => each(b, |x| f64::from(i16::from_le_bytes(x))),
+        4 => each(b, |x| f64::from(u16::from_le_bytes(x))),
+        5 => each(b, |x| f64::from(i32::from_le_bytes(x))),
+        6 => each(b, |x| f64::from(u32::from_le_bytes(x))),
+        7 => each(b, |x| f64::from(f32::from_le_bytes(x))),
+        9 => each(b, f64::from_le_bytes),
+        12 => each(b, |x| i64::from_le_bytes(x) as f64),
+        13 => each(b, |x| u64::from_le_bytes(x) as f64),
         _ => Vec::new(),
     }
 }
@@ -148,7 +148,7 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
         }
     }
     let (mut columns, mut units, mut sources) = (Vec::new(), Vec::new(), Vec::new());
-    let mut room = Room::of(file);
+    let mut budget = Budget::new(file);
     let mut at = 128;
     while at + 8 <= file.len() as u64 {
         let (kind, contents, next) = element(b, at)?;
@@ -157,7 +157,7 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
         let contents = match kind {
             MATRIX => contents,
             COMPRESSED => {
-                unpacked = room.inflated(contents.0)?;
+                unpacked = budget.inflated(contents.0)?;
                 match element(Bytes(&unpacked), 0)? {
                     (MATRIX, contents, _) => contents,
                     _ => continue,
@@ -167,7 +167,7 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
         };
         match matrix(contents, 0)? {
             (name, Value::Numbers(values)) => {
-                room.take(values.len())?;
+                budget.take(values.len())?;
                 columns.push(Series {
                     name,
                     values,
@@ -178,7 +178,7 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
             (name, Value::Matrix(values, rows))
                 if rows > 0 && rows.min(values.len() / rows) <= MOST_SIGNALS =>
             {
-                room.take(values.len())?;
+                budget.take(values.len())?;
                 let in_rows = rows <= values.len() / rows;
                 let signals = if in_rows { rows } else { values.len() / rows };
                 columns.extend((0..signals).map(|i| Series {

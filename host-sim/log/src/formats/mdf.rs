@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 
 use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 
-use super::bytes::{Bytes, Room};
+use super::bytes::{Budget, Bytes};
 use crate::recording::{Group, Recording, RecordingError, Series};
 
 const HEAD: u64 = 24;
@@ -107,7 +107,7 @@ fn text(bytes: Bytes<'_>, at: u64) -> Result<String, RecordingError> {
 struct Data<'a> {
     bytes: Bytes<'a>,
     seen: HashSet<u64>,
-    room: Room,
+    budget: Budget,
 }
 
 /// A list of lists of blocks is as deep as data are.
@@ -129,7 +129,7 @@ impl Data<'_> {
         let block = Block::at(self.bytes, at)?;
         match block.kind() {
             b"##DT" | b"##DV" => out.extend_from_slice(block.contents()?),
-            b"##DZ" => out.extend(unzipped(&block, &mut self.room)?),
+            b"##DZ" => out.extend(unzipped(&block, &mut self.budget)?),
             b"##HL" => self.records(block.link(0), depth + 1, out)?,
             b"##DL" => {
                 let mut list = Some(block);
@@ -155,10 +155,10 @@ impl Data<'_> {
     }
 }
 
-fn unzipped(block: &Block<'_>, room: &mut Room) -> Result<Vec<u8>, RecordingError> {
+fn unzipped(block: &Block<'_>, budget: &mut Budget) -> Result<Vec<u8>, RecordingError> {
     let (b, data) = (block.bytes, block.data());
     let (method, columns) = (b.u8(data + 2)?, b.u32(data + 4)? as usize);
-    let bytes = room.inflated(b.slice(data + 24, b.u64(data + 16)?)?)?;
+    let bytes = budget.inflated(b.slice(data + 24, b.u64(data + 16)?)?)?;
     match method {
         0 => Ok(bytes),
         // Bytes of one place in all records stand together.
@@ -220,7 +220,7 @@ fn conversion(bytes: Bytes<'_>, at: u64) -> Result<Option<Conversion>, Recording
 }
 
 impl Conversion {
-    fn of(&self, x: f64) -> f64 {
+    fn apply(&self, x: f64) -> f64 {
         match self {
             Self::None => x,
             Self::Linear([offset, factor]) => offset + factor * x,
@@ -293,7 +293,7 @@ fn place(block: &Block<'_>, data_bytes: u64) -> Result<Option<Place>, RecordingE
 impl Place {
     fn value(&self, record: &[u8], row: usize) -> f64 {
         if self.is_virtual {
-            return self.conversion.of(row as f64);
+            return self.conversion.apply(row as f64);
         }
         let invalid = |bit: u64| {
             record
@@ -321,7 +321,7 @@ impl Place {
             (_, 32) => f64::from(f32::from_bits(bits as u32)),
             _ => f64::from_bits(bits),
         };
-        self.conversion.of(number)
+        self.conversion.apply(number)
     }
 }
 
@@ -355,7 +355,7 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut blocks = Data {
         bytes,
         seen: HashSet::new(),
-        room: Room::of(file),
+        budget: Budget::new(file),
     };
     for data_group in chain(bytes, header.link(0), "##DG")? {
         let id_size = u64::from(bytes.u8(data_group.data())?);
@@ -383,7 +383,7 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
         }
         let mut data = Vec::new();
         blocks.records(data_group.link(2), 0, &mut data)?;
-        sort(Bytes(&data), id_size, &mut open, &mut blocks.room)?;
+        sort(Bytes(&data), id_size, &mut open, &mut blocks.budget)?;
         let mut made: Vec<(u64, Open)> = open.into_iter().collect();
         made.sort_by_key(|(id, _)| *id);
         groups.extend(made.into_iter().filter_map(|(_, open)| finished(open)));
@@ -399,7 +399,7 @@ fn sort(
     data: Bytes<'_>,
     id_size: u64,
     open: &mut HashMap<u64, Open>,
-    room: &mut Room,
+    budget: &mut Budget,
 ) -> Result<(), RecordingError> {
     let only = open.keys().next().copied().unwrap_or_default();
     let mut at = 0;
@@ -424,7 +424,7 @@ fn sort(
             return Err(format!("group {:?}: its records have no bytes", group.name).into());
         }
         let record = data.slice(at, group.size)?;
-        room.take(group.places.len())?;
+        budget.take(group.places.len())?;
         for place in &mut group.places {
             let value = place.value(record, group.rows);
             place.series.values.push(value);

@@ -73,7 +73,7 @@ impl Format {
     ///
     /// # Errors
     /// No extension that is known, with those that are.
-    pub fn of(path: &Path) -> Result<Self, RecordingError> {
+    pub fn from_path(path: &Path) -> Result<Self, RecordingError> {
         let extension = path
             .extension()
             .unwrap_or_default()
@@ -125,7 +125,7 @@ pub struct TimeColumn {
 /// # Errors
 /// What cannot be read, with the file, and the channel where one is the reason.
 pub fn read(path: &Path, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
-    let format = Format::of(path)?;
+    let format = Format::from_path(path)?;
     let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| named(e.to_string().into()))?;
     read_bytes(bytes, format, time).map_err(named)
@@ -241,7 +241,7 @@ fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Reco
 /// A format of frames, channels that it cannot hold, what the disk says; with the file.
 pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
     let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::of(path)? {
+    let bytes = match Format::from_path(path)? {
         Format::Csv => csv::write(&recording.into_one_group().map_err(named)?),
         Format::Mat => mat::write(&recording.into_one_group().map_err(named)?),
         Format::Mdf4 => mdf::write(&recording),
@@ -268,7 +268,7 @@ pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
 /// A format of channels, what the disk says; with the file.
 pub fn write_frames(path: &Path, frames: &[CandumpFrame]) -> Result<(), RecordingError> {
     let named = |e: String| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::of(path)? {
+    let bytes = match Format::from_path(path)? {
         Format::Candump => {
             let mut out = Vec::new();
             for frame in frames {

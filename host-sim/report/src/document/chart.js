@@ -17,15 +17,21 @@
     return ticks.map((v) => (v == null ? "" : String(Number(v.toPrecision(10)))));
   }
 
+  // The drawing within the axes, until it is restored.
+  function clipped(u) {
+    const { left, top, width, height } = u.bbox;
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.rect(left, top, width, height);
+    u.ctx.clip();
+    return u.ctx;
+  }
+
   // Shaded stretches below everything, markers above them.
   function backdrop(figure, panel) {
     return (u) => {
-      const { left, top, width, height } = u.bbox;
-      const c = u.ctx;
-      c.save();
-      c.beginPath();
-      c.rect(left, top, width, height);
-      c.clip();
+      const { top, height } = u.bbox;
+      const c = clipped(u);
       for (const band of figure.bands) {
         if (band.panel !== null && band.panel !== panel) continue;
         const from = u.valToPos(band.from, "x", true);
@@ -49,12 +55,7 @@
   // Stems and bounds from zero, the intervals of single points, and crosses where lines end.
   function uprights(panel) {
     return (u) => {
-      const { left, top, width, height } = u.bbox;
-      const c = u.ctx;
-      c.save();
-      c.beginPath();
-      c.rect(left, top, width, height);
-      c.clip();
+      const c = clipped(u);
       c.lineWidth = 1.2 * devicePixelRatio;
       for (const series of panel.series) {
         const fromZero = series.mark === "stems" || series.mark === "bounds";

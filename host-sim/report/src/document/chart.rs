@@ -133,7 +133,7 @@ mod tests {
         let points = vec![(0.0, 0.123_456_789), (1.0, f64::NAN), (2.0, -4.0), (9.0, 5.0)];
         let whiskers = Mark::Whiskers(vec![[0.5, 1.5]]);
         let figure = Figure {
-            x: Axis::of("Distance", "m").within(0.0, 3.0),
+            x: Axis::new("Distance", "m").within(0.0, 3.0),
             panels: vec![Panel {
                 series: vec![
                     Series::line("a", 1, points),

@@ -140,6 +140,20 @@ impl Table {
         }
     }
 
+    /// A table whose rows name the heading of each cell, all in the same order. Without a row it has no headings, and is not shown.
+    pub fn of_rows<C: Into<String>, R: IntoIterator<Item = (C, Cell)>>(
+        caption: impl Into<String>,
+        rows: impl IntoIterator<Item = R>,
+    ) -> Self {
+        let mut table = Self::new::<String>(caption, [], []);
+        for row in rows {
+            let (columns, cells): (Vec<_>, _) = row.into_iter().unzip();
+            table.columns = columns.into_iter().map(Into::into).collect();
+            table.rows.push(cells);
+        }
+        table
+    }
+
     /// A table of names and values.
     pub fn of_pairs<N: Into<String>, V: Into<String>>(
         columns: [&str; 2],

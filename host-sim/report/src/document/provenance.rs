@@ -18,7 +18,7 @@ pub struct Provenance {
 
 impl Provenance {
     /// Of a result that follows from a scenario, if there is one.
-    pub fn of(scenario: Option<String>) -> Self {
+    pub fn new(scenario: Option<String>) -> Self {
         Self {
             program: "host-sim",
             version: env!("CARGO_PKG_VERSION"),
@@ -39,7 +39,7 @@ impl Provenance {
 /// Of a result that no scenario decides.
 impl Default for Provenance {
     fn default() -> Self {
-        Self::of(None)
+        Self::new(None)
     }
 }
 
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn a_commit_is_named_and_no_place_on_a_disk() {
-        let Provenance { commit, version, .. } = Provenance::of(None);
+        let Provenance { commit, version, .. } = Provenance::new(None);
         let hash = commit.trim_end_matches("-dirty");
         assert!(
             commit == "unknown" || (hash.len() >= 7 && hash.chars().all(|c| c.is_ascii_hexdigit())),

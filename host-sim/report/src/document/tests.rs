@@ -15,7 +15,7 @@ fn report_of(blocks: Vec<Block>) -> String {
         title: "A <b>title</b>".into(),
         summary: "Course: ours.".into(),
         sections: vec![section],
-        provenance: Provenance::of(Some("seed = 1 # </pre><b>".into())),
+        provenance: Provenance::new(Some("seed = 1 # </pre><b>".into())),
         ..Report::default()
     }
     .to_html()
@@ -189,7 +189,7 @@ fn a_page_and_a_terminal_show_the_same_value_but_for_what_is_marked() {
 
 #[test]
 fn a_figure_that_cannot_be_drawn_fails_the_report_with_its_name() {
-    let x = Axis::of("x", "m").within(1.0, 0.0);
+    let x = Axis::new("x", "m").within(1.0, 0.0);
     let figure = Figure {
         title: "Figure 8".into(),
         x,

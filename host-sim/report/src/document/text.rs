@@ -57,7 +57,9 @@ impl Table {
     /// The table as text: caption, headings, rows, each line ended. Lines are at most `width` long if there is one.
     pub fn to_text(&self, width: Option<usize>) -> String {
         let limit = width.unwrap_or(usize::MAX);
-        let mut columns: Vec<Column> = (0..self.columns.len()).map(|i| Column::new(self, i)).collect();
+        let mut columns: Vec<TextColumn> = (0..self.columns.len())
+            .map(|i| TextColumn::new(self, i))
+            .collect();
         while columns.len() > 1 && span(columns.iter().map(|c| c.least)) > limit {
             columns.pop();
         }
@@ -84,7 +86,7 @@ impl Table {
     }
 }
 
-struct Column<'a> {
+struct TextColumn<'a> {
     heading: &'a str,
     cells: Vec<String>,
     /// Where there is room.
@@ -94,7 +96,7 @@ struct Column<'a> {
     numeric: bool,
 }
 
-impl<'a> Column<'a> {
+impl<'a> TextColumn<'a> {
     fn new(table: &'a Table, index: usize) -> Self {
         let cell = |row: &Vec<Cell>| row.get(index).map_or_else(String::new, words);
         let cells: Vec<String> = table.rows.iter().map(cell).collect();
@@ -165,7 +167,7 @@ fn broken(text: &str, width: usize) -> Vec<String> {
 }
 
 /// Cells of several lines beside each other, the short ones at the top or, as headings stand on their columns, at the bottom.
-fn push_lines(text: &mut String, columns: &[Column], cells: Vec<Vec<String>>, at_the_bottom: bool) {
+fn push_lines(text: &mut String, columns: &[TextColumn], cells: Vec<Vec<String>>, at_the_bottom: bool) {
     let lines = cells.iter().map(Vec::len).max().unwrap_or(0);
     for line in 0..lines {
         let padded = columns.iter().zip(&cells).map(|(column, cell)| {

@@ -23,7 +23,7 @@ pub(super) fn svg(figure: &Figure) -> String {
         .zip(figure.y_limits())
         .map(|(i, y_limits)| Frame::new(figure, i, y_limits))
         .collect();
-    let legend = Legend::of(figure, &frames);
+    let legend = Legend::new(figure, &frames);
     let mut page = Page::default();
     if let Some(legend) = &legend {
         page.structure.push((0..columns).collect());

@@ -181,7 +181,7 @@ impl<'a> Frame<'a> {
     }
 
     fn plots_of(&self, series: &Series) -> Vec<Plot> {
-        let style = style::of(series.style);
+        let style = style::by_index(series.style);
         let places = self.places(series);
         let from_zero = || -> Vec<_> {
             let foot = |(x, y): (f64, f64)| if self.lies() { (0.0, y) } else { (x, 0.0) };
@@ -267,7 +267,7 @@ impl<'a> Frame<'a> {
                     &word,
                     TICK_TEXT_SIZE,
                     TextAnchor::End,
-                    style::of(series.style).colour,
+                    style::by_index(series.style).colour,
                 ));
                 *end -= LETTER * (word.chars().count() + 1) as f64;
             }
@@ -289,8 +289,8 @@ impl<'a> Frame<'a> {
     }
 
     /// Dash and width of a series' line.
-    pub(super) fn look(&self, series: &Series) -> (&'static str, f64) {
-        let style = style::of(series.style);
+    pub(super) fn line_style(&self, series: &Series) -> (&'static str, f64) {
+        let style = style::by_index(series.style);
         // All pieces of a series look alike.
         let length: f64 = self
             .on_page(series)
@@ -326,8 +326,8 @@ impl<'a> Frame<'a> {
     }
 
     fn lines(&self, series: &Series) -> Vec<Plot> {
-        let style = style::of(series.style);
-        let (dash, width) = self.look(series);
+        let style = style::by_index(series.style);
+        let (dash, width) = self.line_style(series);
         if self.lies() {
             return vec![line(self.places(series), style, dash, width)];
         }

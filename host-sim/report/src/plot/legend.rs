@@ -41,7 +41,7 @@ pub(super) struct Legend<'a> {
 
 impl<'a> Legend<'a> {
     /// Each name once, in lines; none if nothing has a name.
-    pub(super) fn of(figure: &'a Figure, frames: &'a [Frame<'a>]) -> Option<Self> {
+    pub(super) fn new(figure: &'a Figure, frames: &'a [Frame<'a>]) -> Option<Self> {
         let panels = figure.panels.iter().zip(frames);
         let series = panels.flat_map(|(panel, frame)| panel.series.iter().map(move |s| (s, frame)));
         let named = series
@@ -131,11 +131,11 @@ impl<'a> Legend<'a> {
     }
 
     fn swatch(&self, series: &Series, frame: &Frame, x: f64, y: f64) -> Vec<Plot> {
-        let style = style::of(series.style);
+        let style = style::by_index(series.style);
         let middle = x + 0.5 * SWATCH;
         let mut plots = Vec::new();
         if series.joined || series.mark == Mark::Line {
-            let (dash, width) = frame.look(series);
+            let (dash, width) = frame.line_style(series);
             plots.push(line(vec![(x, y), (x + SWATCH, y)], style, dash, width));
         }
         let stem = [[(x, y), (x + 0.7 * SWATCH, y)]];

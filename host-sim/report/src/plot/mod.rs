@@ -60,7 +60,7 @@ pub struct Axis {
 
 impl Axis {
     /// An axis of a quantity with its unit, `-` if that is 1; limits from the data.
-    pub fn of(quantity: &str, unit: &str) -> Self {
+    pub fn new(quantity: &str, unit: &str) -> Self {
         Self {
             label: format!("{quantity} ({unit})"),
             ..Self::default()
@@ -95,6 +95,14 @@ pub struct Panel {
     pub y: Axis,
     /// In drawing order: the last lies on top.
     pub series: Vec<Series>,
+}
+
+impl Panel {
+    /// A plot of these series.
+    pub fn new(title: impl Into<String>, y: Axis, series: Vec<Series>) -> Self {
+        let title = title.into();
+        Self { title, y, series }
+    }
 }
 
 impl Panel {
@@ -262,7 +270,7 @@ pub enum Shade {
 pub struct PlotError(String);
 
 /// Room left between a series and the frame, as a share of the extent of the values.
-const ROOM: f64 = 0.05;
+const MARGIN: f64 = 0.05;
 /// The same behind a line that ends before its time.
 const ROOM_BEHIND: f64 = 0.02;
 
@@ -304,7 +312,7 @@ impl Figure {
             }
             // A dot or a stem stands free of the frame.
             Some((low, high)) if self.x.whole || low == high => (low - 0.5, high + 0.5),
-            Some((low, high)) => (low - ROOM * (high - low), high + ROOM * (high - low)),
+            Some((low, high)) => (low - MARGIN * (high - low), high + MARGIN * (high - low)),
             None => (0.0, 1.0),
         };
         self.x.limits.unwrap_or_else(of_data)
@@ -325,7 +333,7 @@ impl Figure {
     }
 
     /// Ends of each panel's values: as given, else of the data in view (of all panels if [`Figure::same_y`]), with
-    /// a little room.
+    /// a little margin.
     pub fn y_limits(&self) -> Vec<(f64, f64)> {
         let x = self.x_limits();
         let visible = |panel: &Panel| extent(panel.series.iter().flat_map(|s| s.values_within(x)));
@@ -364,15 +372,15 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
         })
 }
 
-/// Limits that hold `extent` with room; a single value gets half of itself on both sides, no value or zero (-1, 1). What
+/// Limits that hold `extent` with margin; a single value gets half of itself on both sides, no value or zero (-1, 1). What
 /// starts from zero may stand on the frame if it `stands` there, as lines do; a dot would be cut.
 fn with_room(extent: Option<(f64, f64)>, stands: bool) -> (f64, f64) {
     match extent {
         None | Some((0.0, 0.0)) => (-1.0, 1.0),
         Some((low, high)) if low == high => (low - 0.5 * low.abs(), high + 0.5 * high.abs()),
         Some((low, high)) => {
-            let room = ROOM * (high - low);
-            let room_at = |end: f64| if stands && end == 0.0 { 0.0 } else { room };
+            let margin = MARGIN * (high - low);
+            let room_at = |end: f64| if stands && end == 0.0 { 0.0 } else { margin };
             (low - room_at(low), high + room_at(high))
         }
     }

@@ -1,4 +1,4 @@
-//! The page that a figure stands on: its measures, and words on it.
+//! Measures of the page that a figure is drawn on, and text on it.
 
 use kuva::render::render::{Primitive, TextAnchor};
 
@@ -9,14 +9,14 @@ pub(super) const PANEL_HEIGHT: f64 = 190.0;
 pub(super) const LEFT: f64 = 76.0;
 pub(super) const RIGHT: f64 = 16.0;
 pub(super) const TEXT_SIZE: u32 = 14;
-/// About the width of a letter of that size.
+/// Approximate width of a letter of that size.
 pub(super) const LETTER: f64 = 8.2;
 
-/// Words whose middle has the height `y`.
+/// A text whose vertical middle is at `y`.
 pub(super) fn text(x: f64, y: f64, words: &str, size: u32, anchor: TextAnchor, colour: &str) -> Primitive {
     Primitive::Text {
         x,
-        // Half the height of a digit.
+        // 0.36 of the size is half the height of a digit.
         y: y + 0.36 * f64::from(size),
         content: words.into(),
         size,
@@ -27,7 +27,7 @@ pub(super) fn text(x: f64, y: f64, words: &str, size: u32, anchor: TextAnchor, c
     }
 }
 
-/// Room for the names of the rows.
+/// Width that the names of the rows need.
 pub(super) fn names_room(figure: &Figure) -> f64 {
     let longest = figure
         .rows

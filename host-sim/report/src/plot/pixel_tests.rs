@@ -6,13 +6,13 @@ use super::*;
 
 /// One blue series over 0 to 100, values -1 to 1.
 fn alone(mark: Mark, points: Vec<(f64, f64)>) -> Figure {
-    let panel = Panel {
-        title: String::new(),
-        y: Axis::of("y", "-").within(-1.0, 1.0),
-        series: vec![Series::with_mark("", 1, mark, points)],
-    };
+    let panel = Panel::new(
+        "",
+        Axis::new("y", "-").within(-1.0, 1.0),
+        vec![Series::with_mark("", 1, mark, points)],
+    );
     Figure {
-        x: Axis::of("x", "-").within(0.0, 100.0),
+        x: Axis::new("x", "-").within(0.0, 100.0),
         panels: vec![panel],
         ..Figure::default()
     }
@@ -25,7 +25,7 @@ struct Picture {
 }
 
 impl Picture {
-    fn of(figure: &Figure) -> Self {
+    fn new(figure: &Figure) -> Self {
         let pixels = raster::pixels(&figure.to_svg().unwrap()).unwrap();
         let dark = |x: u32, y: u32| pixels.pixel(x, y).is_some_and(|p| p.red() < 60 && p.blue() < 60);
         let (w, h) = (pixels.width(), pixels.height());
@@ -74,7 +74,7 @@ impl Picture {
 /// No ink beyond the lowest and highest value near it: half of a line 1.5 points wide is 1.5 pixels, and a pixel for
 /// its soft edge. And ink where the data are: each extreme is reached.
 fn ink_stays_within(points: &[(f64, f64)]) {
-    let picture = Picture::of(&alone(Mark::Line, points.to_vec()));
+    let picture = Picture::new(&alone(Mark::Line, points.to_vec()));
     let (dx, dy) = picture.pixel();
     let (reach_x, reach_y) = (3.0 * dx, 2.6 * dy);
     let value_at = |x: f64| {
@@ -140,7 +140,7 @@ fn a_line_breaks_where_it_is_not_a_number() {
     for point in &mut points[40..=60] {
         point.1 = f64::NAN;
     }
-    let picture = Picture::of(&alone(Mark::Line, points));
+    let picture = Picture::new(&alone(Mark::Line, points));
     let (dx, _) = picture.pixel();
     let within = |from: f64, to: f64| picture.blue().iter().filter(|p| p.0 > from && p.0 < to).count();
     assert_eq!(within(39.0 + 3.0 * dx, 61.0 - 3.0 * dx), 0);
@@ -149,7 +149,7 @@ fn a_line_breaks_where_it_is_not_a_number() {
 
 #[test]
 fn stems_stand_where_the_values_are_and_nowhere_between() {
-    let picture = Picture::of(&alone(Mark::Stems, vec![(20.0, 0.8), (50.0, -0.6), (80.0, 0.4)]));
+    let picture = Picture::new(&alone(Mark::Stems, vec![(20.0, 0.8), (50.0, -0.6), (80.0, 0.4)]));
     let blue = picture.blue();
     for (x, value) in [(20.0, 0.8_f64), (50.0, -0.6), (80.0, 0.4)] {
         let stem: Vec<_> = blue.iter().filter(|p| (p.0 - x).abs() < 2.0).collect();
@@ -170,7 +170,7 @@ fn stems_stand_where_the_values_are_and_nowhere_between() {
 #[test]
 fn an_interval_is_shaded_between_its_ends_only() {
     let low: Vec<_> = (0..=10).map(|i| (10.0 * f64::from(i), -0.2)).collect();
-    let picture = Picture::of(&alone(Mark::Interval(vec![0.6; 11]), low));
+    let picture = Picture::new(&alone(Mark::Interval(vec![0.6; 11]), low));
     let (drawn_low, drawn_high) = extent(picture.blue().iter().map(|p| p.1)).unwrap();
     let pixel = picture.pixel().1;
     assert!((drawn_low + 0.2).abs() < 2.0 * pixel && (drawn_high - 0.6).abs() < 2.0 * pixel);
@@ -185,7 +185,7 @@ fn lines_that_coincide_are_both_seen() {
     figure.panels[0]
         .series
         .insert(0, Series::line("reference", 0, points));
-    let picture = Picture::of(&figure);
+    let picture = Picture::new(&figure);
     let [left, right, top, bottom] = picture.frame;
     // At a quarter of the width a column of pixels shows black, blue and black again.
     let x = (left + 0.26 * (right - left)) as u32;
@@ -210,7 +210,7 @@ fn equal_figures_are_equal_files() {
 fn the_png_is_twice_as_wide_as_the_page_and_holds_letters() {
     let mut figure = alone(Mark::Line, vec![(0.0, 0.0), (100.0, 0.5)]);
     let plain = raster::pixels(&figure.to_svg().unwrap()).unwrap();
-    figure.x = Axis::of("Mwww \u{b1} \u{3b1}", "-").within(0.0, 100.0);
+    figure.x = Axis::new("Mwww \u{b1} \u{3b1}", "-").within(0.0, 100.0);
     let lettered = raster::pixels(&figure.to_svg().unwrap()).unwrap();
     assert_eq!(plain.width(), lettered.width());
     assert!((1800..1850).contains(&plain.width()), "{}", plain.width());

@@ -46,18 +46,18 @@ pub(super) fn of_shade(shade: Shade) -> (&'static str, f64) {
 /// Number of styles that can be told apart.
 pub(super) const STYLES: usize = ALL.len();
 
-pub(super) fn of(index: usize) -> &'static Style {
+pub(super) fn by_index(index: usize) -> &'static Style {
     &ALL[index % STYLES]
 }
 
 /// Colour of a style.
 pub(crate) fn colour(index: usize) -> &'static str {
-    of(index).colour
+    by_index(index).colour
 }
 
 /// Dash and gap of a style, points; empty is solid.
 pub(crate) fn dash(index: usize) -> Vec<f64> {
-    of(index)
+    by_index(index)
         .dash
         .split_whitespace()
         .filter_map(|n| n.parse().ok())
@@ -66,5 +66,5 @@ pub(crate) fn dash(index: usize) -> Vec<f64> {
 
 /// Width of a style's line, points.
 pub(crate) fn width(index: usize) -> f64 {
-    of(index).width
+    by_index(index).width
 }

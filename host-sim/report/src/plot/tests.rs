@@ -3,18 +3,14 @@
 use super::*;
 
 fn panel(title: &str, series: Vec<Series>) -> Panel {
-    Panel {
-        title: title.into(),
-        y: Axis::of("Lateral error", "m"),
-        series,
-    }
+    Panel::new(title, Axis::new("Lateral error", "m"), series)
 }
 
 fn two_panels() -> Figure {
     let first = vec![(0.0, 0.0), (50.0, 0.13), (100.0, 0.0), (150.0, 9.0)];
     Figure {
         title: "Two drivers".into(),
-        x: Axis::of("Distance", "m").within(0.0, 100.0),
+        x: Axis::new("Distance", "m").within(0.0, 100.0),
         same_y: true,
         panels: vec![
             panel("A", vec![Series::line("manual", 0, first)]),
@@ -234,12 +230,8 @@ fn a_map_has_a_word_in_each_field_and_a_tick_at_each() {
         field(40.0, 0.1, "unstable", 3),
     ];
     let figure = Figure {
-        x: Axis::of("Speed", "km/h").within(15.0, 45.0),
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::of("t_p", "s").within(0.05, 0.15),
-            series,
-        }],
+        x: Axis::new("Speed", "km/h").within(15.0, 45.0),
+        panels: vec![Panel::new("", Axis::new("t_p", "s").within(0.05, 0.15), series)],
         ..Figure::default()
     };
     let svg = figure.to_svg().unwrap();

@@ -100,30 +100,19 @@ fn products(results: &AdaptationResults) -> Table {
             Some(_) => "no",
         };
         let [law, driver] = names(results, pair).map(Cell::text);
-        vec![
-            law,
-            driver,
-            Cell::number(pair.law_slope, 3),
-            Cell::number(pair.driver_slope, 3),
-            Cell::number(pair.product, 3),
-            Cell::text(verdict),
+        [
+            ("Law", law),
+            ("Driver", driver),
+            ("dK_1/dK_hg (N.m)", Cell::number(pair.law_slope, 3)),
+            ("dK_hg/dK_1 (1/N.m)", Cell::number(pair.driver_slope, 3)),
+            ("Product", Cell::number(pair.product, 3)),
+            ("Small gain", Cell::text(verdict)),
         ]
     };
-    let columns = [
-        "Law",
-        "Driver",
-        "dK_1/dK_hg (N.m)",
-        "dK_hg/dK_1 (1/N.m)",
-        "Product",
-        "Small gain",
-    ];
-    Table::new(
-        format!(
-            "The largest slopes of law and driver, in size; small gain holds up to a product of {SMALL_GAIN}"
-        ),
-        columns,
-        results.pairs.iter().map(row),
-    )
+    let caption = format!(
+        "The largest slopes of law and driver, in size; small gain holds up to a product of {SMALL_GAIN}"
+    );
+    Table::of_rows(caption, results.pairs.iter().map(row))
 }
 
 /// The laws with which small gain holds for every driver.
@@ -147,34 +136,22 @@ fn judgement(results: &AdaptationResults) -> String {
 }
 
 fn loops(results: &AdaptationResults) -> Table {
+    let first = format!("Behind it, less {}", results.laws[0]);
     let row = |pair: &Pair| {
         let [law, driver] = names(results, pair).map(Cell::text);
         let [before, behind] = &pair.k_hg;
-        vec![
-            law,
-            driver,
-            with_interval(before.as_ref()),
-            with_interval(behind.as_ref()),
-            with_interval(pair.against_first.as_ref()),
-            with_interval(pair.swing_nm.as_ref()),
-            Cell::number(pair.period_s, 0),
+        [
+            ("Law", law),
+            ("Driver", driver),
+            ("K_hg before the loss", with_interval(before.as_ref())),
+            ("Behind it", with_interval(behind.as_ref())),
+            (first.as_str(), with_interval(pair.against_first.as_ref())),
+            ("Deviation of K_1 (N.m)", with_interval(pair.swing_nm.as_ref())),
+            ("Period (s)", Cell::number(pair.period_s, 0)),
         ]
     };
-    let first = format!("Behind it, less {}", results.laws[0]);
-    let columns = [
-        "Law",
-        "Driver",
-        "K_hg before the loss",
-        "Behind it",
-        &first,
-        "Deviation of K_1 (N.m)",
-        "Period (s)",
-    ];
-    Table::new(
-        "K_hg before the loss and settled behind it; how K_1 moves before the loss",
-        columns,
-        results.pairs.iter().map(row),
-    )
+    let caption = "K_hg before the loss and settled behind it; how K_1 moves before the loss";
+    Table::of_rows(caption, results.pairs.iter().map(row))
 }
 
 fn maps_figure(results: &AdaptationResults) -> Figure {
@@ -199,12 +176,12 @@ fn maps_figure(results: &AdaptationResults) -> Figure {
         let both = [(0, "driver, from low K_hg"), (1, "driver, from high K_hg")];
         Panel {
             title: name.clone(),
-            y: Axis::of("K_hg", "-").within(0.0, 1.02),
+            y: Axis::new("K_hg", "-").within(0.0, 1.02),
             series: pairs.map(of_law).chain(both.into_iter().map(of_driver)).collect(),
         }
     };
     Figure {
-        x: Axis::of("K_1", "N.m"),
+        x: Axis::new("K_1", "N.m"),
         panels: results.drivers.iter().enumerate().map(panel).collect(),
         ..Figure::default()
     }
@@ -232,8 +209,8 @@ fn series_figure(results: &AdaptationResults, quantity: Quantity) -> Figure {
     let panel = |(number, name): (usize, &String)| Panel {
         title: name.clone(),
         y: match quantity {
-            Quantity::KHg => Axis::of("K_hg", "-").within(0.0, 1.02),
-            Quantity::K1 => Axis::of("K_1", "N.m"),
+            Quantity::KHg => Axis::new("K_hg", "-").within(0.0, 1.02),
+            Quantity::K1 => Axis::new("K_1", "N.m"),
         },
         series: results
             .pairs
@@ -243,7 +220,7 @@ fn series_figure(results: &AdaptationResults, quantity: Quantity) -> Figure {
             .collect(),
     };
     Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         panels: results.drivers.iter().enumerate().map(panel).collect(),
         bands: vec![Band {
             label: "torque lost".into(),
@@ -287,12 +264,12 @@ fn swings_figure() -> Figure {
                 0.0 => "a law that follows at once".into(),
                 lag => format!("a law that follows with a lag of {lag} s"),
             },
-            y: around(Axis::of("Delay", "s"), DELAYS_S, size[1]),
+            y: around(Axis::new("Delay", "s"), DELAYS_S, size[1]),
             series: vec![Series::with_mark("", 1, mark, fields().collect())],
         }
     };
     Figure {
-        x: around(Axis::of("Lag of trust", "s"), TRUST_S, size[0]),
+        x: around(Axis::new("Lag of trust", "s"), TRUST_S, size[0]),
         panels: LAW_LAGS_S.map(panel).to_vec(),
         ..Figure::default()
     }

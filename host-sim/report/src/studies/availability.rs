@@ -2,7 +2,7 @@
 
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::availability::{Availability, Cell as Row, Ended, Leg, Rate};
+use haptic_batch::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_campaign::campaign::CaseResult;
 use haptic_sim::worlds::{WORLDS, WorldKind};
 use serde::Serialize;
@@ -44,31 +44,26 @@ fn detection_table(faults: &Detection) -> Table {
     let row = |row: &CaseResult| {
         let time = |n: usize| Cell::number(row.left_after_ms.map(|times| f64::from(times[n])), 0);
         let metres = |value: Option<f64>| Cell::number(value, 2);
-        vec![
-            Cell::text(row.name),
-            Cell::Text(row.class.to_string()),
-            Cell::Text(if row.asks_to_leave { "leave" } else { "may go on" }.into()),
-            Cell::number(row.runs as f64, 0),
-            Cell::number(100.0 * row.left as f64 / row.runs as f64, 0),
-            time(0),
-            time(1),
-            metres(Some(row.deviation_m)),
-            metres(row.excess_m),
+        [
+            ("Fault", Cell::text(row.name)),
+            ("Class", Cell::Text(row.class.to_string())),
+            (
+                "ECU should",
+                Cell::Text(if row.asks_to_leave { "leave" } else { "may go on" }.into()),
+            ),
+            ("Runs", Cell::number(row.runs as f64, 0)),
+            (
+                "Left (%)",
+                Cell::number(100.0 * row.left as f64 / row.runs as f64, 0),
+            ),
+            ("Median (ms)", time(0)),
+            ("Longest (ms)", time(1)),
+            ("Deviation (m)", metres(Some(row.deviation_m))),
+            ("Beyond dropping (m)", metres(row.excess_m)),
         ]
     };
-    Table::new(
+    Table::of_rows(
         format!("Faults noticed in the world '{}'", faults.world),
-        [
-            "Fault",
-            "Class",
-            "ECU should",
-            "Runs",
-            "Left (%)",
-            "Median (ms)",
-            "Longest (ms)",
-            "Deviation (m)",
-            "Beyond dropping (m)",
-        ],
         faults.shown().map(row),
     )
 }
@@ -85,19 +80,19 @@ fn detection_figure(faults: &Detection) -> Figure {
     Figure {
         rows: faults.shown().map(|row| row.name.into()).collect(),
         panels: vec![
-            Panel {
-                title: "The ECU left".into(),
-                y: Axis::of("Share of the runs", "%").within(0.0, 105.0),
-                series: vec![Series::with_mark("", 2, Mark::Stems, left)],
-            },
-            Panel {
-                title: "How soon".into(),
-                y: Axis::of("Time from the onset", "s"),
-                series: vec![
+            Panel::new(
+                "The ECU left",
+                Axis::new("Share of the runs", "%").within(0.0, 105.0),
+                vec![Series::with_mark("", 2, Mark::Stems, left)],
+            ),
+            Panel::new(
+                "How soon",
+                Axis::new("Time from the onset", "s"),
+                vec![
                     Series::with_mark("longest", 3, Mark::Stems, after(1)),
                     Series::dots("median", 1, after(0)),
                 ],
-            },
+            ),
         ],
         ..Figure::default()
     }
@@ -158,61 +153,57 @@ fn finding(rate: &Rate, hours: f64) -> String {
 /// Every world on every road; the roads of a judged one together.
 fn table(results: &Availability) -> Table {
     let row = |row: &Row| {
-        vec![
-            Cell::text(row.world),
-            Cell::text(row.road),
-            Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
-            Cell::number(row.hours, 2),
-            Cell::number(row.declarations.count as f64, 0),
-            Cell::Text(finding(&row.declarations, row.hours)),
-            Cell::number(row.declarations.upper_95, 4),
-            Cell::Text(format!("{} of {}", row.cars_with, row.cars)),
-            Cell::number(100.0 * (1.0 - row.available), 2),
-            Cell::number(row.latched as f64, 0),
-            Cell::number(row.diverged as f64, 0),
-            Cell::number(row.lost_by_hand.legs as f64, 0),
-            Cell::number(row.sdlp_m, 2),
+        [
+            ("World", Cell::text(row.world)),
+            ("Road", Cell::text(row.road)),
+            (
+                "Judged",
+                Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
+            ),
+            ("Hours", Cell::number(row.hours, 2)),
+            (
+                "False declarations",
+                Cell::number(row.declarations.count as f64, 0),
+            ),
+            (
+                "Rate, 95 % confidence",
+                Cell::Text(finding(&row.declarations, row.hours)),
+            ),
+            ("At most (1/h)", Cell::number(row.declarations.upper_95, 4)),
+            (
+                "Cars with one",
+                Cell::Text(format!("{} of {}", row.cars_with, row.cars)),
+            ),
+            (
+                "Time without guidance (%)",
+                Cell::number(100.0 * (1.0 - row.available), 2),
+            ),
+            ("Latched", Cell::number(row.latched as f64, 0)),
+            ("Off the road", Cell::number(row.diverged as f64, 0)),
+            ("Lost by hand", Cell::number(row.lost_by_hand.segments as f64, 0)),
+            ("SDLP (m)", Cell::number(row.sdlp_m, 2)),
         ]
     };
-    Table::new(
-        "",
-        [
-            "World",
-            "Road",
-            "Judged",
-            "Hours",
-            "False declarations",
-            "Rate, 95 % confidence",
-            "At most (1/h)",
-            "Cars with one",
-            "Time without guidance (%)",
-            "Latched",
-            "Off the road",
-            "Lost by hand",
-            "SDLP (m)",
-        ],
-        results.cells.iter().chain(&results.together).map(row),
-    )
+    Table::of_rows("", results.cells.iter().chain(&results.together).map(row))
 }
 
 /// The same by the faults that the ECU named.
 fn causes(results: &Availability) -> Table {
     let rows = results.cells.iter().flat_map(|row| {
         row.causes.iter().map(|cause| {
-            vec![
-                Cell::text(row.world),
-                Cell::text(row.road),
-                Cell::Text(cause.faults.clone()),
-                Cell::number(cause.rate.count as f64, 0),
-                Cell::Text(finding(&cause.rate, row.hours)),
+            [
+                ("World", Cell::text(row.world)),
+                ("Road", Cell::text(row.road)),
+                ("Faults", Cell::Text(cause.faults.clone())),
+                ("Declarations", Cell::number(cause.rate.count as f64, 0)),
+                (
+                    "Rate, 95 % confidence",
+                    Cell::Text(finding(&cause.rate, row.hours)),
+                ),
             ]
         })
     });
-    Table::new(
-        "By what the ECU named",
-        ["World", "Road", "Faults", "Declarations", "Rate, 95 % confidence"],
-        rows,
-    )
+    Table::of_rows("By what the ECU named", rows)
 }
 
 /// The drives of judged worlds in which something happened, each with the number that drives it alone (`--drives`).
@@ -222,48 +213,43 @@ fn drives(results: &Availability) -> Table {
         Ended::Latched => "latched",
         Ended::Diverged => "off the road",
     };
-    let row = |leg: &Leg| {
-        let declared = leg.declarations.iter().map(|declaration| {
+    let row = |segment: &DriveSegment| {
+        let declared = segment.declarations.iter().map(|declaration| {
             format!(
                 "{} at {:.1} s, {:.2} m/s2",
                 declaration.faults, declaration.time_s, declaration.lateral_m_per_s2
             )
         });
-        vec![
-            Cell::Text(leg.world.clone()),
-            Cell::Text(leg.road.clone()),
-            Cell::number(f64::from(leg.number), 0),
-            Cell::Text(leg.car.to_string()),
-            Cell::number(leg.speed_kmh, 1),
-            Cell::Text(declared.collect::<Vec<_>>().join("; ")),
-            Cell::Text(off(leg.ended).into()),
-            Cell::Text(off(leg.by_hand.ended).into()),
-            Cell::number(leg.by_hand.largest_error_m, 2),
+        [
+            ("World", Cell::Text(segment.world.clone())),
+            ("Road", Cell::Text(segment.road.clone())),
+            ("Drive", Cell::number(f64::from(segment.number), 0)),
+            ("Car", Cell::Text(segment.car.to_string())),
+            ("Speed (km/h)", Cell::number(segment.speed_kmh, 1)),
+            (
+                "Declared, at a lateral acceleration of the road",
+                Cell::Text(declared.collect::<Vec<_>>().join("; ")),
+            ),
+            ("Ended", Cell::Text(off(segment.ended).into())),
+            ("By hand", Cell::Text(off(segment.by_hand.ended).into())),
+            (
+                "Largest error by hand (m)",
+                Cell::number(segment.by_hand.largest_error_m, 2),
+            ),
         ]
     };
-    Table::new(
+    Table::of_rows(
         "Drives in which something happened",
-        [
-            "World",
-            "Road",
-            "Drive",
-            "Car",
-            "Speed (km/h)",
-            "Declared, at a lateral acceleration of the road",
-            "Ended",
-            "By hand",
-            "Largest error by hand (m)",
-        ],
-        results.legs.iter().map(row),
+        results.segments.iter().map(row),
     )
 }
 
-/// What is real in each world.
+/// What each world has beyond the paper's.
 pub fn worlds() -> Table {
     let row = |c: &WorldKind| vec![Cell::text(c.name), Cell::text(c.what)];
     Table::new(
-        "What is real in each world",
-        ["World", "What is real"],
+        "What each world adds to the paper's",
+        ["World", "What it adds"],
         WORLDS.iter().map(row),
     )
 }
@@ -300,10 +286,10 @@ fn figure(results: &Availability) -> Figure {
             })
             .collect(),
         panels: vec![
-            Panel {
-                title: "False declarations".into(),
-                y: Axis::of("Rate", "1/h").within(0.0, most_rate),
-                series: vec![
+            Panel::new(
+                "False declarations",
+                Axis::new("Rate", "1/h").within(0.0, most_rate),
+                vec![
                     Series::with_mark(
                         "seen, with the 95 % interval",
                         1,
@@ -312,15 +298,15 @@ fn figure(results: &Availability) -> Figure {
                     ),
                     Series::with_mark("none seen: at most (95 %)", 0, Mark::Bounds, bounds),
                 ],
-            },
-            Panel {
-                title: "Without guidance".into(),
-                y: Axis::of("Share of the time", "%").within(
+            ),
+            Panel::new(
+                "Without guidance",
+                Axis::new("Share of the time", "%").within(
                     0.0,
                     most(&mut results.cells.iter().map(|row| 100.0 * (1.0 - row.available))),
                 ),
-                series: vec![Series::with_mark("", 2, Mark::Stems, away)],
-            },
+                vec![Series::with_mark("", 2, Mark::Stems, away)],
+            ),
         ],
         ..Figure::default()
     }
@@ -338,14 +324,14 @@ mod tests {
             judged: true,
             hours,
             available: 1.0,
-            declarations: Rate::of(count, hours),
+            declarations: Rate::new(count, hours),
             causes: Vec::new(),
             cars: 1,
             cars_with: 0,
             latched: 0,
             diverged: 0,
             lost_by_hand: Lost {
-                legs: 0,
+                segments: 0,
                 hours: 0.0,
                 declarations: 0,
             },
@@ -362,7 +348,7 @@ mod tests {
             hours: 0.1,
             cells: vec![cell(0, 1.0 / 12.0), cell(3, 2.0), cell(0, 0.0)],
             together: Vec::new(),
-            legs: Vec::new(),
+            segments: Vec::new(),
         };
         let figure = figure(&results);
         let [seen, none] = &figure.panels[0].series[..] else {

@@ -21,7 +21,7 @@ pub struct Load {
 
 impl Load {
     /// Of these messages.
-    pub fn of(messages: Vec<MessageLoad>) -> Self {
+    pub fn new(messages: Vec<MessageLoad>) -> Self {
         Self {
             bit_rate: BIT_RATE,
             load: messages.iter().map(|row| row.load).sum(),
@@ -72,14 +72,14 @@ impl Load {
             .map(|(i, row)| (i as f64 + 1.0, 100.0 * row.load))
             .collect();
         let most = self.messages.iter().map(|m| m.load).fold(0.0, f64::max);
-        let y = Axis::of("Worst-case share of the bus", "%").within(0.0, 108.0 * most);
+        let y = Axis::new("Worst-case share of the bus", "%").within(0.0, 108.0 * most);
         Figure {
             rows: self.messages.iter().map(|row| row.message.into()).collect(),
-            panels: vec![Panel {
-                title: String::new(),
+            panels: vec![Panel::new(
+                "",
                 y,
-                series: vec![Series::with_mark("", 1, crate::plot::Mark::Stems, points)],
-            }],
+                vec![Series::with_mark("", 1, crate::plot::Mark::Stems, points)],
+            )],
             ..Figure::default()
         }
     }

@@ -28,40 +28,25 @@ pub(super) fn table(found: &Changes) -> Table {
     let row = |l: &ChangesLine| {
         let count = |n: usize| Cell::number(n as f64, 0);
         let share = |held: haptic_batch::experiment::Held| Cell::number(held.share(), 3);
-        vec![
-            Cell::text(l.kind),
-            count(l.drives),
-            count(l.seen),
-            count(l.refuted_otherwise),
-            count(l.steps_seen),
-            count(l.within_5_s),
-            share(l.instants),
-            count(l.identified[0]),
-            count(l.false_identifications[0]),
-            share(l.intervals[0]),
-            count(l.identified[1]),
-            count(l.false_identifications[1]),
-            share(l.intervals[1]),
+        [
+            ("What changes", Cell::text(l.kind)),
+            ("Drives", count(l.drives)),
+            ("Seen", count(l.seen)),
+            ("Refuted otherwise", count(l.refuted_otherwise)),
+            ("Steps of K_hg seen", count(l.steps_seen)),
+            ("within 5 s", count(l.within_5_s)),
+            ("Instants held by 95 %", share(l.instants)),
+            ("Identified", count(l.identified[0])),
+            ("False", count(l.false_identifications[0])),
+            ("Held by 95 %", share(l.intervals[0])),
+            ("In pieces: identified", count(l.identified[1])),
+            ("False", count(l.false_identifications[1])),
+            ("Held by 95 %", share(l.intervals[1])),
         ]
     };
-    Table::new(
+    Table::of_rows(
         "Seen: the driver is refuted for having changed. False: called identified, and for more than half of the time more than 4 \
                   standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. In pieces: of the drives that are seen to change.",
-        [
-            "What changes",
-            "Drives",
-            "Seen",
-            "Refuted otherwise",
-            "Steps of K_hg seen",
-            "within 5 s",
-            "Instants held by 95 %",
-            "Identified",
-            "False",
-            "Held by 95 %",
-            "In pieces: identified",
-            "False",
-            "Held by 95 %",
-        ],
         found.lines.iter().chain([&found.all]).map(row),
     )
 }

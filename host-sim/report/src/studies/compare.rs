@@ -106,17 +106,17 @@ fn laws(results: &CompareResults) -> Table {
             .map(|(name, value)| format!("{name} {}", rounded(*value)))
             .collect();
         let [before, after] = law.objective.map_or([None; 2], |objective| objective.map(Some));
-        vec![
-            Cell::text(&law.name),
-            Cell::text(&law.kind),
-            Cell::text(law.source),
-            Cell::number(before, 4),
-            Cell::number(after, 4),
-            Cell::Text(if law.oracle && law.objective.is_some() {
-                "for each driver by itself".into()
-            } else {
-                values.join(", ")
-            }),
+        let found = match law.oracle && law.objective.is_some() {
+            true => "for each driver by itself".into(),
+            false => values.join(", "),
+        };
+        [
+            ("Law", Cell::text(&law.name)),
+            ("Kind", Cell::text(&law.kind)),
+            ("Source", Cell::text(law.source)),
+            ("Objective untuned", Cell::number(before, 4)),
+            ("Tuned", Cell::number(after, 4)),
+            ("Parameters", Cell::Text(found)),
         ]
     };
     let caption = match results.budget {
@@ -125,15 +125,7 @@ fn laws(results: &CompareResults) -> Table {
             "Laws as they were judged: the best of {budget} sets each, by the objective on the training drives"
         ),
     };
-    let columns = [
-        "Law",
-        "Kind",
-        "Source",
-        "Objective untuned",
-        "Tuned",
-        "Parameters",
-    ];
-    Table::new(caption, columns, results.laws.iter().map(row))
+    Table::of_rows(caption, results.laws.iter().map(row))
 }
 
 /// Every law in every world over the first law: the mean over the drivers, and who is worst off.
@@ -225,11 +217,11 @@ fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
             .iter()
             .map(|(_, value)| value.interval_95.unwrap_or([value.mean; 2]))
             .collect();
-        Panel {
-            title: name.clone(),
-            y: Axis::of(metric.label, metric.unit),
-            series: vec![Series::with_mark("", 0, Mark::Whiskers(ends), points)],
-        }
+        Panel::new(
+            name.clone(),
+            Axis::new(metric.label, metric.unit),
+            vec![Series::with_mark("", 0, Mark::Whiskers(ends), points)],
+        )
     };
     Figure {
         rows: results.laws.iter().map(|law| law.name.clone()).collect(),

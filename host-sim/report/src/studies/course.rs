@@ -72,9 +72,9 @@ fn plan(survey: &Survey) -> Figure {
         axis.within(0.5 * (from + to - size), 0.5 * (from + to + size))
     };
     Figure {
-        x: around(Axis::of("x", "m"), left, right, height * PANEL_ASPECT),
+        x: around(Axis::new("x", "m"), left, right, height * PANEL_ASPECT),
         panels: vec![Panel {
-            y: around(Axis::of("y", "m"), low, high, height),
+            y: around(Axis::new("y", "m"), low, high, height),
             series: vec![Series::line("", 1, points)],
             ..Panel::default()
         }],
@@ -85,7 +85,7 @@ fn plan(survey: &Survey) -> Figure {
 fn along(survey: &Survey, course: &Course) -> Figure {
     let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| Panel {
         title: String::new(),
-        y: Axis::of(quantity, unit),
+        y: Axis::new(quantity, unit),
         series: vec![Series::line(
             "",
             1,
@@ -93,7 +93,7 @@ fn along(survey: &Survey, course: &Course) -> Figure {
         )],
     };
     Figure {
-        x: Axis::of("Distance along the lane's centre", "m"),
+        x: Axis::new("Distance along the lane's centre", "m"),
         panels: vec![
             panel("Curvature", "1/km", |s| 1e3 * s.curvature_1pm),
             panel("Bank, left up", "%", |s| 100.0 * s.bank_rad.tan()),

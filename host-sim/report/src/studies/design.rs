@@ -4,10 +4,10 @@ use super::ended;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::identify::{INFORMED, TABLE_4};
-use haptic_batch::design::{Answer, Design};
+use haptic_batch::design::{Design, DesignResult};
 
 /// The document of the answer.
-pub fn report(answer: &Answer) -> Report {
+pub fn report(answer: &DesignResult) -> Report {
     let caption = "How long they have to drive, over the frequency of the probe.";
     let mut blocks = vec![
         Block::figure("design", figure(answer), caption),
@@ -35,7 +35,7 @@ fn form(design: &Design) -> String {
 }
 
 /// Every design, the best one marked.
-fn table(answer: &Answer) -> Table {
+fn table(answer: &DesignResult) -> Table {
     let row = |(i, d): (usize, &Design)| {
         let mut cells = vec![
             Cell::Text(if answer.best == Some(i) {
@@ -71,7 +71,7 @@ fn table(answer: &Answer) -> Table {
 }
 
 /// The answer in words.
-fn sentences(answer: &Answer) -> Vec<String> {
+fn sentences(answer: &DesignResult) -> Vec<String> {
     let Some(best) = answer.best.map(|i| &answer.designs[i]) else {
         return vec![format!(
             "No design here tells {} to {} within two hours.",
@@ -112,7 +112,7 @@ fn sentences(answer: &Answer) -> Vec<String> {
 }
 
 /// How little a drive that is long enough for another parameter tells of the delay; none if it tells enough.
-fn cost_of_delay(answer: &Answer, best: &Design, needed_s: f64) -> Option<String> {
+fn cost_of_delay(answer: &DesignResult, best: &Design, needed_s: f64) -> Option<String> {
     // Its fourth parameter is t_p.
     let (_, low, high) = TABLE_4[3];
     let enough_s = 0.1 * (high - low);
@@ -128,7 +128,7 @@ fn cost_of_delay(answer: &Answer, best: &Design, needed_s: f64) -> Option<String
 }
 
 /// Minutes over the frequency, a line for each amplitude, a panel for each course.
-fn figure(answer: &Answer) -> Figure {
+fn figure(answer: &DesignResult) -> Figure {
     let mut courses: Vec<&str> = answer.designs.iter().map(|d| d.course.as_str()).collect();
     courses.dedup();
     let minutes = |d: &Design| d.needed_s.map_or(f64::NAN, |s| s / 60.0);
@@ -161,14 +161,14 @@ fn figure(answer: &Answer) -> Figure {
             Some(s) => format!(", {:.1} min without a probe", s / 60.0),
             None => ", no drive is long enough without a probe".into(),
         });
-        Panel {
-            title: format!("{course}{}", without.unwrap_or_default()),
-            y: Axis::of("Drive needed", "min"),
-            series: series.collect(),
-        }
+        Panel::new(
+            format!("{course}{}", without.unwrap_or_default()),
+            Axis::new("Drive needed", "min"),
+            series.collect(),
+        )
     });
     Figure {
-        x: Axis::of("Frequency of the probe", "Hz"),
+        x: Axis::new("Frequency of the probe", "Hz"),
         panels: panels.collect(),
         ..Figure::default()
     }

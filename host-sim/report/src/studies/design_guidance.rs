@@ -52,14 +52,14 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
     }
 }
 
-/// Whether the bars can be had together, and what the chosen row lacks where the search has not been.
+/// Whether a set that was tried holds all bars, and which bars the chosen row misses on the held-out drives.
 fn what_holds(results: &DesignResults, choice: &Choice) -> String {
     let bars = &results.bars;
     let is_over = |(ratio, bar): (&f64, &Bar)| *ratio > bar.limit;
     let holding = results
         .sets
         .iter()
-        .filter(|set| !set.ratios.iter().zip(bars).any(is_over));
+        .filter(|set| set.unstable == 0 && !set.ratios.iter().zip(bars).any(is_over));
     let missed: Vec<String> = choice
         .held_out
         .iter()
@@ -138,13 +138,13 @@ fn figure(results: &DesignResults, choice: &Choice) -> Figure {
             .into_iter()
             .map(|(label, style, points)| Series::dots(label, style, points));
         Panel {
-            y: Axis::of(quantity, "-"),
+            y: Axis::new(quantity, "-"),
             series: series.collect(),
             ..Panel::default()
         }
     };
     Figure {
-        x: Axis::of("Effort or conflict of drivers with a line", "-"),
+        x: Axis::new("Effort or conflict of drivers with a line", "-"),
         panels: vec![panel("Mean peak error", 0), panel("Mean loss", 2)],
         ..Figure::default()
     }

@@ -2,7 +2,7 @@
 
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_analysis::identify::{Difference, Population, told};
+use haptic_analysis::identify::{Difference, Population, value_and_error};
 use haptic_batch::identify::Drivers;
 
 /// Parameters that a torque record can carry.
@@ -46,7 +46,8 @@ fn gaps(found: &Drivers) -> String {
     let of = |wanted: &str| {
         let missing = found.drivers.iter().enumerate().filter(|(_, (_, fit))| {
             let list = fit.parameters.list();
-            list.iter().any(|l| l.0 == wanted && told(l.2).is_none())
+            list.iter()
+                .any(|l| l.0 == wanted && value_and_error(l.2).is_none())
         });
         let numbers: Vec<String> = missing.map(|(i, _)| (i + 1).to_string()).collect();
         (!numbers.is_empty()).then(|| format!("{wanted} of {}", numbers.join(", ")))
@@ -85,64 +86,46 @@ fn each(found: &Drivers) -> Table {
 fn differences(found: &[Difference]) -> Table {
     let row = |d: &Difference| {
         let [low, high] = d.interval_95;
-        vec![
-            Cell::text(d.parameter),
-            Cell::text(d.unit),
-            number(Some(d.difference)),
-            number(Some(d.standard_error)),
-            number(Some(low)),
-            number(Some(high)),
-            number(Some(d.p_holm)),
-            Cell::Text(if d.real { "they differ" } else { "not told apart" }.into()),
+        [
+            ("", Cell::text(d.parameter)),
+            ("Unit", Cell::text(d.unit)),
+            ("Difference", number(Some(d.difference))),
+            ("Standard error", number(Some(d.standard_error))),
+            ("95 % from", number(Some(low))),
+            ("to", number(Some(high))),
+            ("p (Holm)", number(Some(d.p_holm))),
+            (
+                "Verdict",
+                Cell::Text(if d.real { "they differ" } else { "not told apart" }.into()),
+            ),
         ]
     };
-    Table::new(
+    Table::of_rows(
         format!(
             "The first driver less the second. Each interval is that of its parameter alone; the verdict is on all {} together, at \
              5 % (Holm's method).",
             found.len()
         ),
-        [
-            "",
-            "Unit",
-            "Difference",
-            "Standard error",
-            "95 % from",
-            "to",
-            "p (Holm)",
-            "Verdict",
-        ],
         found.iter().map(row),
     )
 }
 
 fn population(found: &[Population], gaps: &str) -> Table {
     let row = |p: &Population| {
-        vec![
-            Cell::text(p.parameter),
-            Cell::text(p.unit),
-            Cell::number(p.drivers as f64, 0),
-            number(Some(p.mean)),
-            number(Some(p.mean_interval_95[0])),
-            number(Some(p.mean_interval_95[1])),
-            number(Some(p.spread)),
-            number(Some(p.spread_interval_95[0])),
-            number(Some(p.spread_interval_95[1])),
+        [
+            ("", Cell::text(p.parameter)),
+            ("Unit", Cell::text(p.unit)),
+            ("Drivers", Cell::number(p.drivers as f64, 0)),
+            ("Mean", number(Some(p.mean))),
+            ("95 % from", number(Some(p.mean_interval_95[0]))),
+            ("to", number(Some(p.mean_interval_95[1]))),
+            ("Spread", number(Some(p.spread))),
+            ("95 % from", number(Some(p.spread_interval_95[0]))),
+            ("to", number(Some(p.spread_interval_95[1]))),
         ]
     };
-    Table::new(
+    Table::of_rows(
         format!("The group: its mean, and the standard deviation between drivers (random effects). {gaps}"),
-        [
-            "",
-            "Unit",
-            "Drivers",
-            "Mean",
-            "95 % from",
-            "to",
-            "Spread",
-            "95 % from",
-            "to",
-        ],
         found.iter().map(row),
     )
 }
@@ -167,7 +150,7 @@ fn figure(found: &Drivers) -> Figure {
             let named = list.iter().find(|l| l.0 == wanted);
             unit = named.map_or(unit, |l| l.1);
             let Some(p) = named.map(|l| l.2) else { continue };
-            if let (Some((x, _)), Some(interval)) = (told(p), p.interval_95) {
+            if let (Some((x, _)), Some(interval)) = (value_and_error(p), p.interval_95) {
                 let place = usize::from(!p.identified);
                 points[place].push(((i + 1) as f64, x));
                 intervals[place].push(interval);
@@ -180,11 +163,7 @@ fn figure(found: &Drivers) -> Figure {
                 series.push(Series::with_mark(labels[place], [1, 3][place], mark, points));
             }
         }
-        Panel {
-            title: String::new(),
-            y: Axis::of(wanted, unit),
-            series,
-        }
+        Panel::new("", Axis::new(wanted, unit), series)
     });
     Figure {
         x: Axis::counting("Driver, as the table lists them").within(ends[0], ends[1]),

@@ -52,7 +52,7 @@ pub fn write_series(
 fn provenance(evaluation: &Evaluation) -> Provenance {
     let mut runs = evaluation.runs.iter();
     let one = runs.find(|(s, _)| s.condition() == Condition::Mid && s.failure().kind == FailureKind::Torque);
-    Provenance::of(one.map(|(scenario, _)| scenario.to_toml()))
+    Provenance::new(one.map(|(scenario, _)| scenario.to_toml()))
 }
 
 /// The main metrics of each run.
@@ -142,16 +142,15 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
                     .map(|s| (s.s_m, s.lateral_error_m))
                     .collect()
             };
-            panels.push(Panel {
-                title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
-                y: Axis::of("Lateral error", "m"),
-                series: runs
-                    .flat_map(|(s, run)| {
-                        let line = Series::line(label(s.condition()), style(s.condition()), path(run));
-                        ended(line, run.diverged().then_some(LEFT_THE_ROAD))
-                    })
-                    .collect(),
-            });
+            panels.push(Panel::new(
+                format!("Driver {} (t_p {t_p} s){ending}", number + 1),
+                Axis::new("Lateral error", "m"),
+                runs.flat_map(|(s, run)| {
+                    let line = Series::line(label(s.condition()), style(s.condition()), path(run));
+                    ended(line, run.diverged().then_some(LEFT_THE_ROAD))
+                })
+                .collect(),
+            ));
         }
     }
     let [from, to] = evaluation.results.window_m;
@@ -160,7 +159,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
     let bands = bands.chain(absences);
     Figure {
         title: title.into(),
-        x: Axis::of("Distance along the road", "m").within(from, to),
+        x: Axis::new("Distance along the road", "m").within(from, to),
         same_y: true,
         panels,
         bands: bands.filter(|band| band.from < to && band.to > from).collect(),

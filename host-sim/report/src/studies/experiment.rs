@@ -43,16 +43,16 @@ fn paths(drive: &Drive) -> Figure {
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Distance along the road", "m"),
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::of("Lateral error", "m"),
-            series: [Series::line("measured", 0, drive.path.clone())]
+        x: Axis::new("Distance along the road", "m"),
+        panels: vec![Panel::new(
+            "",
+            Axis::new("Lateral error", "m"),
+            [Series::line("measured", 0, drive.path.clone())]
                 .into_iter()
                 .chain(again("identified driver", 1, &drive.noise_model))
                 .chain(again("identified driver, published method", 3, &drive.paper))
                 .collect(),
-        }],
+        )],
         ..Figure::default()
     }
 }
@@ -68,15 +68,15 @@ fn torque(drive: &Drive) -> Figure {
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Time", "s"),
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::of("Driver torque", "N.m"),
-            series: vec![
+        x: Axis::new("Time", "s"),
+        panels: vec![Panel::new(
+            "",
+            Axis::new("Driver torque", "N.m"),
+            vec![
                 line("measured", 0, &t.measured_nm),
                 line("simulated", 3, &t.simulated_nm),
             ],
-        }],
+        )],
         ..Figure::default()
     }
 }
@@ -109,11 +109,7 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
         }
         series.push(dots("noise model", 0, -ASIDE, guided, |d| &d.noise_model));
         series.push(dots("published method", 3, ASIDE, guided, |d| &d.paper));
-        Panel {
-            title: title.into(),
-            y: Axis::of("Trajectory error", "m"),
-            series,
-        }
+        Panel::new(title, Axis::new("Trajectory error", "m"), series)
     });
     Figure {
         x: Axis::counting("Participant").within(ends[0], ends[1]),
@@ -138,15 +134,15 @@ fn estimates(experiment: &Experiment) -> Figure {
     });
     Figure {
         x: Axis::counting("Participant"),
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::of("K_hg", "-"),
-            series: vec![
+        panels: vec![Panel::new(
+            "",
+            Axis::new("K_hg", "-"),
+            vec![
                 Series::dots("truth", 0, truth.collect()),
                 Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),
                 Series::dots("published method", 3, published.collect()),
             ],
-        }],
+        )],
         ..Figure::default()
     }
 }
@@ -223,8 +219,8 @@ fn means(experiment: &Experiment) -> String {
 /// Truth beside estimates, of the guided or the manual drives.
 fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     let sum = |d: &Drive| d.truth.k_d + haptic_analysis::identify::Muscle::default().k_nms;
-    type Column = (&'static str, fn(&Parameters) -> &Parameter, usize);
-    let columns: [Column; 5] = [
+    type ParameterColumn = (&'static str, fn(&Parameters) -> &Parameter, usize);
+    let columns: [ParameterColumn; 5] = [
         ("gain_1", |p| &p.gain_1, 3),
         ("gain_2", |p| &p.gain_2, 3),
         ("gain_3", |p| &p.gain_3, 2),

@@ -14,7 +14,7 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
          without a mark on the left has no deadline. The deviation is that from the fault-free run, beside what it is if the torque \
          is dropped in the step in which the ECU leaves. Off road: runs that go more than {OFF_ROAD_M} m aside with the torque \
          dropped as well, or that are so far aside without the fault too when the ECU leaves; their excess is not judged. \
-         Pushed: how far a fault of class C goes from a vehicle whose torque is cut at the onset. A number with an arrow stands for \
+         Pushed: the distance from a vehicle whose torque is cut at the onset, for class C. A number with an arrow stands for \
          what is beyond the axis."
     );
     let mut blocks = vec![
@@ -42,7 +42,7 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
 }
 
 /// What the ECU reported in a run.
-pub fn story(case: &FaultCase, outcome: TrialOutcome) -> Section {
+pub fn report_of_run(case: &FaultCase, outcome: TrialOutcome) -> Section {
     let speed = match outcome.change {
         None => format!("{} km/h", outcome.speed_kmh),
         Some(change) => change.to_string(),
@@ -122,38 +122,23 @@ fn shares(campaign: &Campaign) -> Table {
     let row = |row: &CaseResult| {
         let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);
         let [median, most] = row.noticed_after_ms;
-        vec![
-            Cell::text(row.name),
-            Cell::number(row.runs as f64, 0),
-            percent(row.noticed, row.runs),
-            interval(row.noticed_interval),
-            time(median),
-            time(most),
-            Cell::number(row.deviation_95_m, 2),
-            Cell::number(row.deviation_m, 2),
-            percent(row.left_lane, row.runs),
-            interval(row.left_lane_interval),
+        [
+            ("Fault", Cell::text(row.name)),
+            ("Runs", Cell::number(row.runs as f64, 0)),
+            ("Noticed (%)", percent(row.noticed, row.runs)),
+            ("of (%)", interval(row.noticed_interval)),
+            ("Median (ms)", time(median)),
+            ("95 % (ms)", time(most)),
+            ("Dev. 95 % (m)", Cell::number(row.deviation_95_m, 2)),
+            ("Worst (m)", Cell::number(row.deviation_m, 2)),
+            ("Left lane (%)", percent(row.left_lane, row.runs)),
+            ("of it (%)", interval(row.left_lane_interval)),
         ]
     };
-    Table::new(
-        "",
-        [
-            "Fault",
-            "Runs",
-            "Noticed (%)",
-            "of (%)",
-            "Median (ms)",
-            "95 % (ms)",
-            "Dev. 95 % (m)",
-            "Worst (m)",
-            "Left lane (%)",
-            "of it (%)",
-        ],
-        campaign.rows.iter().map(row),
-    )
+    Table::of_rows("", campaign.rows.iter().map(row))
 }
 
-/// What the faults of each class do, without rows in which no ECU decides where the vehicle goes.
+/// Sums of the rows of each class that the limits judge ([`CaseResult::is_limited`]).
 fn by_class(campaign: &Campaign) -> Table {
     let row = |class: Class| {
         let rows: Vec<&CaseResult> = campaign
@@ -164,32 +149,30 @@ fn by_class(campaign: &Campaign) -> Table {
         let sum = |of: fn(&CaseResult) -> u64| rows.iter().map(|row| of(row)).sum::<u64>();
         let most =
             |of: fn(&CaseResult) -> Option<f64>| rows.iter().filter_map(|row| of(row)).reduce(f64::max);
-        vec![
-            Cell::Text(class.to_string()),
-            Cell::number(rows.len() as f64, 0),
-            Cell::number(sum(|row| row.runs) as f64, 0),
-            percent(sum(|row| row.left_lane), sum(|row| row.runs)),
-            Cell::number(most(|row| Some(row.deviation_m)), 2),
-            Cell::number(most(|row| row.excess_m), 2),
-            Cell::number(most(|row| row.pushed_m), 2),
+        [
+            ("Class", Cell::Text(class.to_string())),
+            ("Rows", Cell::number(rows.len() as f64, 0)),
+            ("Runs", Cell::number(sum(|row| row.runs) as f64, 0)),
+            (
+                "Left lane (%)",
+                percent(sum(|row| row.left_lane), sum(|row| row.runs)),
+            ),
+            (
+                "Worst deviation (m)",
+                Cell::number(most(|row| Some(row.deviation_m)), 2),
+            ),
+            ("Excess (m)", Cell::number(most(|row| row.excess_m), 2)),
+            ("Pushed (m)", Cell::number(most(|row| row.pushed_m), 2)),
         ]
     };
-    Table::new(
-        "Rows that the limits judge",
-        [
-            "Class",
-            "Rows",
-            "Runs",
-            "Left lane (%)",
-            "Worst deviation (m)",
-            "Excess (m)",
-            "Pushed (m)",
-        ],
-        Class::ALL
-            .into_iter()
-            .filter(|&class| campaign.rows.iter().any(|row| row.class == class))
-            .map(row),
-    )
+    let classes = Class::ALL.into_iter();
+    let there = classes.filter(|&class| {
+        campaign
+            .rows
+            .iter()
+            .any(|row| row.class == class && row.is_limited)
+    });
+    Table::of_rows("Rows that the limits judge", there.map(row))
 }
 
 /// A run that failed, and how to run it again.
@@ -211,51 +194,31 @@ fn table(campaign: &Campaign) -> Table {
             0 => "pass".into(),
             n => format!("FAIL in {n}"),
         };
-        vec![
-            Cell::text(row.name),
-            Cell::Text(row.class.to_string()),
-            Cell::Text(verdict),
-            count(row.runs),
-            count(row.seen),
-            count(row.cycles),
-            time(row.deadline_ms.and(row.worst_reaction_ms)),
-            time(row.deadline_ms),
-            Cell::number(row.peak_torque_nm, 3),
-            Cell::number(row.torque_bound_nm, 1),
-            count(row.left),
-            Cell::number(row.left_after_ms.map(|[median, _]| f64::from(median)), 0),
-            Cell::number(row.deviation_m, 2),
-            metres(row.dropped_m),
-            metres(row.excess_m),
-            metres(row.pushed_m),
-            count(row.left_lane),
-            count(row.off_road),
+        [
+            ("Fault", Cell::text(row.name)),
+            ("Class", Cell::Text(row.class.to_string())),
+            ("Verdict", Cell::Text(verdict)),
+            ("Runs", count(row.runs)),
+            ("Seen", count(row.seen)),
+            ("Cycles", count(row.cycles)),
+            ("Reaction (ms)", time(row.deadline_ms.and(row.worst_reaction_ms))),
+            ("Deadline (ms)", time(row.deadline_ms)),
+            ("Peak torque (N.m)", Cell::number(row.peak_torque_nm, 3)),
+            ("Bound (N.m)", Cell::number(row.torque_bound_nm, 1)),
+            ("ECU left", count(row.left)),
+            (
+                "After (ms)",
+                Cell::number(row.left_after_ms.map(|[median, _]| f64::from(median)), 0),
+            ),
+            ("Deviation (m)", Cell::number(row.deviation_m, 2)),
+            ("Dropped (m)", metres(row.dropped_m)),
+            ("Excess (m)", metres(row.excess_m)),
+            ("Pushed (m)", metres(row.pushed_m)),
+            ("Left lane", count(row.left_lane)),
+            ("Off road", count(row.off_road)),
         ]
     };
-    Table::new(
-        "",
-        [
-            "Fault",
-            "Class",
-            "Verdict",
-            "Runs",
-            "Seen",
-            "Cycles",
-            "Reaction (ms)",
-            "Deadline (ms)",
-            "Peak torque (N.m)",
-            "Bound (N.m)",
-            "ECU left",
-            "After (ms)",
-            "Deviation (m)",
-            "Dropped (m)",
-            "Excess (m)",
-            "Pushed (m)",
-            "Left lane",
-            "Off road",
-        ],
-        campaign.rows.iter().map(row),
-    )
+    Table::of_rows("", campaign.rows.iter().map(row))
 }
 
 /// Reaction beside deadline, torque beside bound. Deadlines span 1 ms to seconds, so the reaction is a share of its
@@ -272,17 +235,13 @@ fn figure(campaign: &Campaign) -> Figure {
     });
     let names = 1.0..=campaign.rows.len() as f64;
     let bound = vec![(names.start() - 0.5, 100.0), (names.end() + 0.5, 100.0)];
-    let panel = |title: &str, y: Axis, series: Vec<Series>| Panel {
-        title: title.into(),
-        y,
-        series,
-    };
+    let panel = |title: &str, y: Axis, series: Vec<Series>| Panel::new(title, y, series);
     Figure {
         rows: campaign.rows.iter().map(|row| row.name.into()).collect(),
         panels: vec![
             panel(
                 "Worst reaction",
-                Axis::of("Share of the deadline", "%"),
+                Axis::new("Share of the deadline", "%"),
                 vec![
                     Series::line("deadline", 3, bound),
                     Series::with_mark("worst seen", 1, Mark::Stems, reaction),
@@ -290,7 +249,7 @@ fn figure(campaign: &Campaign) -> Figure {
             ),
             panel(
                 "Largest torque",
-                Axis::of("Torque", "N.m"),
+                Axis::new("Torque", "N.m"),
                 vec![
                     Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.peak_torque_nm))),
                     Series::dots("bound of the torque", 3, of(&|row| Some(row.torque_bound_nm))),
@@ -299,7 +258,7 @@ fn figure(campaign: &Campaign) -> Figure {
             panel(
                 "Largest deviation",
                 // What goes further is off the road.
-                Axis::of("Deviation", "m").within(0.0, OFF_ROAD_M),
+                Axis::new("Deviation", "m").within(0.0, OFF_ROAD_M),
                 vec![
                     Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.deviation_m))),
                     Series::dots("torque dropped", 4, of(&|row| row.dropped_m)),

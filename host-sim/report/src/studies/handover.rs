@@ -46,34 +46,20 @@ fn table(results: &HandoverResults) -> Table {
             (true, true, true) => "TOO MUCH",
             (true, true, false) => "holds",
         };
-        let peaks = [row.manual_m, row.nominal_m, row.handover_m, row.loss_m];
-        let ratios = [row.handover_ratio, row.loss_ratio];
-        let mut cells = vec![
-            Cell::number(row.speed_kmh, 0),
-            Cell::number(row.t_p, 1),
-            Cell::Text(row.condition.to_string()),
-            Cell::text(verdict),
-        ];
-        cells.extend(ratios.map(|value| Cell::number(value, 2)));
-        cells.extend(peaks.map(|value| Cell::number(value, 3)));
-        cells
-    };
-    Table::new(
-        "",
         [
-            "Speed (km/h)",
-            "t_p (s)",
-            "Reliance",
-            "Verdict",
-            "Handover ratio",
-            "Sudden loss ratio",
-            "Manual (m)",
-            "No failure (m)",
-            "Handover (m)",
-            "Sudden loss (m)",
-        ],
-        results.rows.iter().map(row),
-    )
+            ("Speed (km/h)", Cell::number(row.speed_kmh, 0)),
+            ("t_p (s)", Cell::number(row.t_p, 1)),
+            ("Reliance", Cell::Text(row.condition.to_string())),
+            ("Verdict", Cell::text(verdict)),
+            ("Handover ratio", Cell::number(row.handover_ratio, 2)),
+            ("Sudden loss ratio", Cell::number(row.loss_ratio, 2)),
+            ("Manual (m)", Cell::number(row.manual_m, 3)),
+            ("No failure (m)", Cell::number(row.nominal_m, 3)),
+            ("Handover (m)", Cell::number(row.handover_m, 3)),
+            ("Sudden loss (m)", Cell::number(row.loss_m, 3)),
+        ]
+    };
+    Table::of_rows("", results.rows.iter().map(row))
 }
 
 /// A panel for each driver that is judged: ratios over the speed.
@@ -110,14 +96,14 @@ fn figure(results: &HandoverResults) -> Figure {
                 series.extend(ended(line, (!to_the_end).then_some(UNSTABLE)));
             }
         }
-        Panel {
-            title: format!("Driver with t_p {t_p} s"),
-            y: Axis::of("Ratio", "-"),
+        Panel::new(
+            format!("Driver with t_p {t_p} s"),
+            Axis::new("Ratio", "-"),
             series,
-        }
+        )
     };
     Figure {
-        x: Axis::of("Speed", "km/h").within(SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0),
+        x: Axis::new("Speed", "km/h").within(SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0),
         same_y: true,
         panels: DRIVERS_T_P.map(panel).to_vec(),
         ..Figure::default()

@@ -18,11 +18,7 @@ fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
 }
 
 fn panel(quantity: &str, unit: &str, series: Vec<Series>) -> Panel {
-    Panel {
-        title: String::new(),
-        y: Axis::of(quantity, unit),
-        series,
-    }
+    Panel::new("", Axis::new(quantity, unit), series)
 }
 
 /// What a line or an area breaks at: a place between rows that are no neighbours, from whose values nothing is drawn.
@@ -76,7 +72,7 @@ fn delay_profile(found: &Identification) -> Option<Figure> {
     series.push(line("level of 95 %", 1, &ends, &[3.84, 3.84]));
     let mut panel = panel("-2 log L above optimum", "-", series);
     panel.y.limits = Some((0.0, HIGHEST));
-    Some(over(Axis::of("t_p", "s"), vec![panel]))
+    Some(over(Axis::new("t_p", "s"), vec![panel]))
 }
 
 /// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed; none if there
@@ -147,7 +143,10 @@ fn torque(found: &Identification) -> Figure {
     if !left_out_bands(found).is_empty() {
         series.push(broken_line("measured, left out", 4, &t.unused_s, &t.unused_nm));
     }
-    let mut figure = over(Axis::of("Time", "s"), vec![panel("Driver torque", "N.m", series)]);
+    let mut figure = over(
+        Axis::new("Time", "s"),
+        vec![panel("Driver torque", "N.m", series)],
+    );
     figure.bands = left_out_bands(found);
     figure
 }
@@ -176,7 +175,7 @@ fn residuals(found: &Identification) -> Figure {
     let unexplained: Vec<f64> = both.map(|(y, m)| y - m).collect();
     let panel = |what: &str, y: &[f64]| panel(what, "N.m", vec![broken_line("", 1, &t.time_s, y)]);
     let mut figure = over(
-        Axis::of("Time", "s"),
+        Axis::new("Time", "s"),
         vec![
             panel("Measured - simulated", &unexplained),
             panel("Residual of the loss", &t.residual_nm),
@@ -214,7 +213,7 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
         panel(name, unit, series)
     };
     let mut figure = over(
-        Axis::of("Time", "s"),
+        Axis::new("Time", "s"),
         vec![
             panel("K_hg", "-", &t.k_hg),
             panel("gain_1", "N.m/m", &t.gain[0]),
@@ -447,6 +446,17 @@ fn parameters(found: &Identification) -> Table {
         let at = found.at_t_nms.as_ref().filter(|_| found.refuted.is_empty())?;
         at.intervals_95.iter().find(|i| i.0 == name).map(|i| i.1)
     };
+    let (caption, from) = if is_published(found) {
+        (
+            "The values, errors and intervals of the published method as it prints them, whether the record holds them or not.",
+            "As published: from",
+        )
+    } else {
+        (
+            "An estimate is given only where the data identify the parameter.",
+            "95 % from",
+        )
+    };
     let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
     let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
     let rows = found
@@ -469,44 +479,19 @@ fn parameters(found: &Identification) -> Table {
             } else {
                 p.estimate
             };
-            vec![
-                Cell::text(name),
-                Cell::text(unit),
-                Cell::text(verdict),
-                number(estimate),
-                number(p.standard_error),
-                number(low),
-                number(high),
-                number(narrow(name).map(|i| i[0])),
-                number(narrow(name).map(|i| i[1])),
+            [
+                ("", Cell::text(name)),
+                ("Unit", Cell::text(unit)),
+                ("Verdict", Cell::text(verdict)),
+                ("Estimate", number(estimate)),
+                ("Standard error", number(p.standard_error)),
+                (from, number(low)),
+                ("to", number(high)),
+                ("t_nms known: from", number(narrow(name).map(|i| i[0]))),
+                ("to", number(narrow(name).map(|i| i[1]))),
             ]
         });
-    let (caption, from) = if is_published(found) {
-        (
-            "The values, errors and intervals of the published method as it prints them, whether the record holds them or not.",
-            "As published: from",
-        )
-    } else {
-        (
-            "An estimate is given only where the data identify the parameter.",
-            "95 % from",
-        )
-    };
-    Table::new(
-        caption,
-        [
-            "",
-            "Unit",
-            "Verdict",
-            "Estimate",
-            "Standard error",
-            from,
-            "to",
-            "t_nms known: from",
-            "to",
-        ],
-        rows,
-    )
+    Table::of_rows(caption, rows)
 }
 
 /// What the data determine where they do not determine each parameter.

@@ -56,27 +56,22 @@ fn each(pieces: &[Piece]) -> Table {
 
 fn changes(changes: &[Change]) -> Table {
     let row = |change: &Change| {
-        let mut cells = vec![Cell::text(change.parameter), Cell::number(change.by, 3)];
-        for (at, [low, high]) in change.at_s.iter().zip(change.at_95_s) {
-            cells.extend([*at, low, high].map(|s| Cell::number(s, 1)));
+        let mut cells = vec![
+            ("Changed", Cell::text(change.parameter)),
+            ("by", Cell::number(change.by, 3)),
+        ];
+        let names = ["Begin (s)", "End (s)"].into_iter().zip(change.at_s);
+        for ((name, at), [low, high]) in names.zip(change.at_95_s) {
+            cells.extend(
+                [(name, at), ("95 % from", low), ("to", high)].map(|(name, s)| (name, Cell::number(s, 1))),
+            );
         }
-        cells.push(Cell::number(change.deviance, 1));
+        cells.push(("Evidence", Cell::number(change.deviance, 1)));
         cells
     };
-    Table::new(
+    Table::of_rows(
         "What changed most, and when: begin and end are the same for a step. Of k_d the share of all gains. Evidence: what the \
                   change adds to twice the log likelihood.",
-        [
-            "Changed",
-            "by",
-            "Begin (s)",
-            "95 % from",
-            "to",
-            "End (s)",
-            "95 % from",
-            "to",
-            "Evidence",
-        ],
         changes.iter().map(row),
     )
 }
@@ -108,15 +103,15 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
             .copied()
             .zip(history.estimate.iter().copied());
         let points = x.iter().copied().zip(middles).collect();
-        Panel {
-            title: String::new(),
-            y: Axis::of(name, unit),
-            series: vec![
+        Panel::new(
+            "",
+            Axis::new(name, unit),
+            vec![
                 Series::interval("95 % interval of a piece", 5, &x, &ends),
                 Series::line("followed", 4, followed.collect()),
                 Series::line("identified in a piece", 1, points),
             ],
-        }
+        )
     };
     let band = |change: &Change| {
         let [from, to] = change.within_s();
@@ -129,7 +124,7 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
         }
     };
     Some(Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         panels: histories.into_iter().map(panel).collect(),
         bands: pieces.changes.iter().map(band).collect(),
         ..Figure::default()

@@ -119,31 +119,21 @@ fn summary(found: &RealDrives) -> Vec<Block> {
         let halves = half(by_hand, accepted);
         let of = |value: fn(&Half) -> f64| with_interval(halves.iter().map(value).collect());
         let wins = halves.iter().filter(|h| h.ours > h.linear).count();
-        vec![
-            Cell::text(name),
-            Cell::number(halves.len() as f64, 0),
-            of(|h| h.own),
-            of(|h| h.ours),
-            of(|h| h.two_point),
-            of(|h| h.linear),
-            of(|h| h.ours - h.linear),
-            Cell::number(wins as f64, 0),
+        [
+            ("Halves", Cell::text(name)),
+            ("Number", Cell::number(halves.len() as f64, 0)),
+            ("Ours, fitted half", of(|h| h.own)),
+            ("Ours, other half", of(|h| h.ours)),
+            ("Two-point, other half", of(|h| h.two_point)),
+            ("Linear, other half", of(|h| h.linear)),
+            ("Ours less linear", of(|h| h.ours - h.linear)),
+            ("Ours is better in", Cell::number(wins as f64, 0)),
         ]
     };
-    let models = Table::new(
+    let models = Table::of_rows(
         "Medians of the variance accounted for, with 95 % intervals of six drives or more. Accepted: nothing is refuted on the half \
          that was fitted. Two-point: our driver without a delay. The linear regression is that of T_d on wheel angle, its rate and \
          acceleration, e_y, its rate and T_h.",
-        [
-            "Halves",
-            "Number",
-            "Ours, fitted half",
-            "Ours, other half",
-            "Two-point, other half",
-            "Linear, other half",
-            "Ours less linear",
-            "Ours is better in",
-        ],
         [
             ("by hand", Some(true), false),
             ("by hand, accepted", Some(true), true),
@@ -163,16 +153,15 @@ fn summary(found: &RealDrives) -> Vec<Block> {
         let asked = |d: &RealDrive| name != "k_hg" || !d.by_hand;
         let identified = seconds(&|d, f| asked(d) && f.identified.contains(&name));
         let all = seconds(&|d, _| asked(d));
-        vec![
-            Cell::text(name),
-            Cell::number(identified, 0),
-            Cell::number(all, 0),
-            Cell::number(identified / all, 2),
+        [
+            ("Parameter", Cell::text(name)),
+            ("Identified, s", Cell::number(identified, 0)),
+            ("Of, s", Cell::number(all, 0)),
+            ("Share", Cell::number(identified / all, 2)),
         ]
     };
-    let shares = Table::new(
+    let shares = Table::of_rows(
         "Driving time in which a parameter is identified. K_hg is asked of shared driving.",
-        ["Parameter", "Identified, s", "Of, s", "Share"],
         PARAMETERS.map(share),
     );
     let chance = judged(found).filter_map(|(_, f)| f.k_hg_p);
@@ -198,21 +187,21 @@ fn predictions(found: &RealDrives) -> Figure {
             let point = |(k, v): (usize, &f64)| (100.0 * (k as f64 + 0.5) / count, v.max(-1.0));
             Series::line(label, style, values.iter().enumerate().map(point).collect())
         };
-        Panel {
-            title: if by_hand { "by hand" } else { "shared" }.into(),
-            y: Axis {
+        Panel::new(
+            if by_hand { "by hand" } else { "shared" },
+            Axis {
                 limits: Some((-1.05, 1.0)),
-                ..Axis::of("variance accounted for", "-")
+                ..Axis::new("variance accounted for", "-")
             },
-            series: vec![
+            vec![
                 sorted("ours", 1, |h| h.ours),
                 sorted("two-point", 2, |h| h.two_point),
                 sorted("linear", 3, |h| h.linear),
             ],
-        }
+        )
     };
     Figure {
-        x: Axis::of("halves, best first", "%"),
+        x: Axis::new("halves, best first", "%"),
         same_y: true,
         panels: [true, false].map(panel).into(),
         ..Figure::default()

@@ -24,41 +24,30 @@ pub(super) fn panel(
         .map(|[k_hg, deviation]| [k_hg - 2.0 * deviation, k_hg + 2.0 * deviation])
         .collect();
     let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
-    Panel {
+    Panel::new(
         title,
-        y: Axis::of("K_hg", "-").within(-0.5, 1.5),
-        series: vec![
+        Axis::new("K_hg", "-").within(-0.5, 1.5),
+        vec![
             Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
             Series::line("truth", 0, truth.to_vec()),
             Series::line("estimate", 1, estimate.collect()),
         ],
-    }
+    )
 }
 
 /// The errors of all participants together, by time.
 fn pooled_table(results: &RelianceResults) -> Table {
     let row = |a: &Accuracy| {
-        vec![
-            Cell::number(a.after_s, 0),
-            Cell::number(a.count as f64, 0),
-            Cell::number(a.bias, 4),
-            Cell::number(a.rms, 4),
-            Cell::number(a.deviation, 4),
-            Cell::number(a.coverage, 3),
+        [
+            ("Time (s)", Cell::number(a.after_s, 0)),
+            ("Estimates", Cell::number(a.count as f64, 0)),
+            ("Bias", Cell::number(a.bias, 4)),
+            ("RMS error", Cell::number(a.rms, 4)),
+            ("Deviation reported", Cell::number(a.deviation, 4)),
+            ("Coverage of 95 %", Cell::number(a.coverage, 3)),
         ]
     };
-    Table::new(
-        "All participants pooled",
-        [
-            "Time (s)",
-            "Estimates",
-            "Bias",
-            "RMS error",
-            "Deviation reported",
-            "Coverage of 95 %",
-        ],
-        results.pooled.iter().map(row),
-    )
+    Table::of_rows("All participants pooled", results.pooled.iter().map(row))
 }
 
 /// The errors of each participant, by time.
@@ -110,7 +99,7 @@ fn figure(results: &RelianceResults) -> Figure {
     let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
     let examples = results.examples.iter().step_by(stride);
     Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         same_y: true,
         panels: examples.map(example_panel).collect(),
         ..Figure::default()

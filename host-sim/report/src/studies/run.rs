@@ -73,11 +73,11 @@ fn figure(single: &SingleRun) -> Figure {
     let diverged = single.run.diverged().then_some(LEFT_THE_ROAD);
     let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| {
         let points = samples.iter().map(|s| (s.s_m, value(s))).collect();
-        Panel {
-            title: String::new(),
-            y: Axis::of(quantity, unit),
-            series: ended(Series::line("", 1, points), diverged).collect(),
-        }
+        Panel::new(
+            "",
+            Axis::new(quantity, unit),
+            ended(Series::line("", 1, points), diverged).collect(),
+        )
     };
     let failed = single
         .scenario
@@ -111,7 +111,7 @@ fn figure(single: &SingleRun) -> Figure {
         ));
     }
     Figure {
-        x: Axis::of("Distance along the road", "m"),
+        x: Axis::new("Distance along the road", "m"),
         panels,
         markers: failed
             .map(|s| Marker {
@@ -185,7 +185,7 @@ pub fn report(single: &SingleRun) -> Report {
             ),
         ],
         // Enough to repeat the run.
-        provenance: Provenance::of(Some(scenario.to_toml())),
+        provenance: Provenance::new(Some(scenario.to_toml())),
     }
 }
 

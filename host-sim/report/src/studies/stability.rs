@@ -100,7 +100,7 @@ fn peak_table(map: &Map) -> Table {
 fn rows(map: &Map, caption: &str, cell: fn(&Drive) -> Cell) -> Table {
     let row = |condition: Condition, t_p: f64| {
         let head = [Cell::Text(name(condition)), Cell::number(t_p, 1)];
-        let drives = of(map, condition).filter(|(place, _)| place.t_p == t_p);
+        let drives = in_condition(map, condition).filter(|(place, _)| place.t_p == t_p);
         head.into_iter()
             .chain(drives.map(|(_, drive)| cell(drive)))
             .collect()
@@ -118,7 +118,7 @@ fn rows(map: &Map, caption: &str, cell: fn(&Drive) -> Cell) -> Table {
 }
 
 /// Every place with the drive of one kind there.
-fn of(map: &Map, condition: Condition) -> impl Iterator<Item = (&Place, &Drive)> {
+fn in_condition(map: &Map, condition: Condition) -> impl Iterator<Item = (&Place, &Drive)> {
     map.places.iter().filter_map(move |place| {
         let drive = place.drives.iter().find(|drive| drive.condition == condition)?;
         Some((place, drive))
@@ -205,11 +205,11 @@ fn figure(map: &Map, show: fn(&Place, &Drive) -> Shown) -> Figure {
     };
     let panel = |condition: Condition| Panel {
         title: name(condition),
-        y: around(Axis::of("t_p", "s"), &DELAYS_S, size[1]),
-        series: of(map, condition).map(series).collect(),
+        y: around(Axis::new("t_p", "s"), &DELAYS_S, size[1]),
+        series: in_condition(map, condition).map(series).collect(),
     };
     Figure {
-        x: around(Axis::of("Speed", "km/h"), &SPEEDS_KMH, size[0]),
+        x: around(Axis::new("Speed", "km/h"), &SPEEDS_KMH, size[0]),
         panels: Condition::ALL.map(panel).to_vec(),
         ..Figure::default()
     }

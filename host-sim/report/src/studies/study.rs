@@ -5,12 +5,14 @@ use std::path::Path;
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::Away;
-use haptic_batch::study::{Difference, Recorded, Session, SessionResult, StudyResults, Who, of_participants};
+use haptic_batch::study::{
+    Difference, Recorded, Session, SessionResult, StudyResults, Subject, of_participants,
+};
 
 /// The document of a study.
 pub fn report(results: &StudyResults) -> Report {
     let mut each = vec![Block::Table(sessions(results))];
-    let waits = |s: &&SessionResult| s.who == Who::Person && s.recorded.is_none();
+    let waits = |s: &&SessionResult| s.who == Subject::Person && s.recorded.is_none();
     let waiting: Vec<_> = results.sessions.iter().filter(waits).collect();
     if let Some(session) = waiting.first() {
         each.push(Block::Text(format!(
@@ -106,10 +108,10 @@ fn row(session: &SessionResult, recorded: &Recorded) -> String {
     fields.join(",")
 }
 
-fn who(who: Who) -> &'static str {
+fn who(who: Subject) -> &'static str {
     match who {
-        Who::Simulated => "simulated",
-        Who::Person => "person",
+        Subject::Simulated => "simulated",
+        Subject::Person => "person",
     }
 }
 
@@ -147,30 +149,19 @@ fn sessions(results: &StudyResults) -> Table {
             (Some(_), _) => left
                 .and_then(|away| away.when_and_why())
                 .map_or("recorded".into(), |left| format!("guidance ended {left}")),
-            (None, Who::Person) => "waits for a person".into(),
-            (None, Who::Simulated) => "not driven".to_owned(),
+            (None, Subject::Person) => "waits for a person".into(),
+            (None, Subject::Simulated) => "not driven".to_owned(),
         };
-        vec![
-            text(&session.participant),
-            text(session.position.to_string()),
-            text(&session.condition),
-            text(state),
-            metric("peak_lateral_error_m"),
-            metric("rms_driver_torque_nm"),
+        [
+            ("Participant", text(&session.participant)),
+            ("Place", text(session.position.to_string())),
+            ("Condition", text(&session.condition)),
+            ("State", text(state)),
+            ("Peak lateral error (m)", metric("peak_lateral_error_m")),
+            ("RMS driver torque (N.m)", metric("rms_driver_torque_nm")),
         ]
     };
-    Table::new(
-        "",
-        [
-            "Participant",
-            "Place",
-            "Condition",
-            "State",
-            "Peak lateral error (m)",
-            "RMS driver torque (N.m)",
-        ],
-        results.sessions.iter().map(row),
-    )
+    Table::of_rows("", results.sessions.iter().map(row))
 }
 
 /// Metrics whose differences a terminal shows; the files have all.
@@ -186,31 +177,21 @@ fn differences(results: &StudyResults) -> Table {
     let row = |d: &Difference| {
         let label = DEFINITIONS.iter().find(|own| own.name == d.metric);
         let number = |value: Option<f64>, decimals| Cell::number(value, decimals);
-        vec![
-            text(format!("{} - {}", d.to, d.from)),
-            text(label.map_or(d.metric, |own| own.label)),
-            text(d.unit),
-            number(Some(d.mean), 4),
-            number(d.interval_95.map(|ends| ends[0]), 4),
-            number(d.interval_95.map(|ends| ends[1]), 4),
-            number(d.effect_size, 2),
-            Cell::number(d.participants as f64, 0),
+        [
+            ("Conditions", text(format!("{} - {}", d.to, d.from))),
+            ("Metric", text(label.map_or(d.metric, |own| own.label))),
+            ("Unit", text(d.unit)),
+            ("Difference", number(Some(d.mean), 4)),
+            ("95 % from", number(d.interval_95.map(|ends| ends[0]), 4)),
+            ("to", number(d.interval_95.map(|ends| ends[1]), 4)),
+            ("d_z", number(d.effect_size, 2)),
+            ("n", Cell::number(d.participants as f64, 0)),
         ]
     };
     let shown = results.differences.iter().filter(|d| SHOWN.contains(&d.metric));
-    Table::new(
+    Table::of_rows(
         "Differences within participants, each with its own 95 % interval (not corrected for their number); d_z is the \
                   mean over the standard deviation of the differences. differences.csv has every metric.",
-        [
-            "Conditions",
-            "Metric",
-            "Unit",
-            "Difference",
-            "95 % from",
-            "to",
-            "d_z",
-            "n",
-        ],
         shown.map(row),
     )
 }

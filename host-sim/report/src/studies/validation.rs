@@ -6,7 +6,8 @@ use super::{changes, place};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::experiment::{
-    Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
+    Changes, CorruptionLine, Corruptions, ExperimentPlan, Held, METHODS, MethodLine, Methods, Repeated,
+    Repetitions,
 };
 
 /// One of the five questions that the validation asks, answered.
@@ -39,8 +40,9 @@ impl Validation {
 
     /// What it rests on, and what came out, in a sentence or two.
     fn summary(&self) -> String {
-        let rests_on = |drives: u32, participants: &[u32], probe_nm: f64, seed: u64| {
-            let numbers: Vec<String> = participants.iter().map(u32::to_string).collect();
+        let rests_on = |drives: u32, plan: &ExperimentPlan| {
+            let numbers: Vec<String> = plan.participants.iter().map(u32::to_string).collect();
+            let (probe_nm, seed) = (plan.probe_nm, plan.seed);
             format!(
                 "Guided drives of each participant: {drives}, of participants {}; probe {probe_nm} N.m, seeds from {seed}",
                 numbers.join(", ")
@@ -48,28 +50,31 @@ impl Validation {
         };
         match self {
             Self::Coverage(r) => {
-                let mut who: Vec<u32> = r.participants.iter().filter_map(|p| p.participant).collect();
-                who.dedup();
-                format!("{}.", rests_on(r.repetitions, &who, r.probe_nm, r.seed))
+                let mut participants: Vec<u32> =
+                    r.participants.iter().filter_map(|p| p.participant).collect();
+                participants.dedup();
+                let (probe_nm, seed) = (r.probe_nm, r.seed);
+                let plan = ExperimentPlan {
+                    participants,
+                    probe_nm,
+                    seed,
+                };
+                format!("{}.", rests_on(r.repetitions, &plan))
             }
             Self::Corruptions(r) => format!(
                 "{}. {} of {} identified values are false. Information bound of gain_1, gain_2, gain_3, t_p, K_hg on clean \
                  logs: {}.",
-                rests_on(r.seeds, &r.participants, r.probe_nm, r.seed),
+                rests_on(r.seeds, &r.plan),
                 r.false_identifications,
                 r.identified,
                 r.bound.map(|b| format!("{b:.4}")).join(", ")
             ),
-            Self::Changes(r) => format!(
-                "{}. {}",
-                rests_on(r.drives, &r.participants, r.probe_nm, r.seed),
-                changes::summary(r)
-            ),
-            Self::Methods(r) => format!("{}.", rests_on(r.seeds, &r.participants, r.probe_nm, r.seed)),
+            Self::Changes(r) => format!("{}. {}", rests_on(r.drives, &r.plan), changes::summary(r)),
+            Self::Methods(r) => format!("{}.", rests_on(r.seeds, &r.plan)),
             Self::Recordings(r) => format!(
                 "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
                  between it and the hands; each lane line has noise of 2 cm where nothing else is said.",
-                rests_on(r.seeds, &r.participants, r.probe_nm, r.seed),
+                rests_on(r.seeds, &r.plan),
                 r.false_identifications,
                 r.identified,
             ),
@@ -167,7 +172,7 @@ fn coverage_figure(result: &Repetitions) -> Figure {
     Figure {
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("95 % intervals that hold the truth", "%"),
+            y: Axis::new("95 % intervals that hold the truth", "%"),
             series,
         }],
         rows: rows.into_iter().map(String::from).collect(),
@@ -357,35 +362,22 @@ fn methods_table(lines: &[MethodLine]) -> Table {
 fn repetitions_table(result: &Repetitions) -> Table {
     let row = |line: &Repeated| {
         let number = |value, decimals| Cell::number(value, decimals);
-        vec![
-            Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
-            Cell::text(line.parameter),
-            Cell::number(line.drives as f64, 0),
-            number(Some(line.identified), 3),
-            number(Some(line.coverage), 3),
-            number(Some(line.coverage_at_t_nms), 3),
-            number(line.bias, 4),
-            number(line.rms, 4),
-            number(line.largest, 4),
-            number(line.standard_error, 4),
-            number(Some(line.bound), 4),
+        [
+            (
+                "Participant",
+                Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
+            ),
+            ("Parameter", Cell::text(line.parameter)),
+            ("Drives", Cell::number(line.drives as f64, 0)),
+            ("Identified", number(Some(line.identified), 3)),
+            ("Coverage of 95 %", number(Some(line.coverage), 3)),
+            ("same, t_nms known", number(Some(line.coverage_at_t_nms), 3)),
+            ("Bias", number(line.bias, 4)),
+            ("RMS error", number(line.rms, 4)),
+            ("Largest error", number(line.largest, 4)),
+            ("Mean standard error", number(line.standard_error, 4)),
+            ("Information bound", number(Some(line.bound), 4)),
         ]
     };
-    Table::new(
-        "",
-        [
-            "Participant",
-            "Parameter",
-            "Drives",
-            "Identified",
-            "Coverage of 95 %",
-            "same, t_nms known",
-            "Bias",
-            "RMS error",
-            "Largest error",
-            "Mean standard error",
-            "Information bound",
-        ],
-        result.participants.iter().chain(&result.pooled).map(row),
-    )
+    Table::of_rows("", result.participants.iter().chain(&result.pooled).map(row))
 }

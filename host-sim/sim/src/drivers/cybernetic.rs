@@ -8,7 +8,7 @@
 //! e_theta/2` (on an arc the line of sight turns by half of what the road does). The third input of the muscle, which that code leaves
 //! open, is the guidance torque with a share K_hg. K_r is 1 there: it carries the aligning torque of that car, and 0.2 carries this one's.
 
-use super::{AnyDriver, Kind, Make, of_scenario};
+use super::{AnyDriver, Kind, Make, angles_of_sight, of_scenario, walking};
 use crate::kind::Parameter;
 use crate::models::STEP_S;
 use crate::parts::{Driver, DriverView};
@@ -35,16 +35,13 @@ impl Driver for Cybernetic {
     }
 
     fn step(&mut self, view: &DriverView) -> f64 {
-        // A standing car has no lines of sight by time.
-        let v = view.speed_m_per_s.max(1.0);
-        let near = view.lane.e_y_m / (v * self.look_ahead_s[0]);
-        let far = 0.5 * view.lane.e_theta_rad;
+        let [near, far] = angles_of_sight(view, self.look_ahead_s[0]);
         let [lag, delay, torque] = &mut self.state;
-        let (gain, lead) = (self.k_c / v, self.t_l / self.t_i);
+        let (gain, lead) = (self.k_c / walking(view), self.t_l / self.t_i);
         let seen = self.k_p * far + gain * (lead * near + (1.0 - lead) * *lag);
         // P(s) = 2/(1 + tau_p*s/2) - 1.
         let target = 2.0 * *delay - seen;
-        let wanted = (self.k_r * v + self.k_t) * target
+        let wanted = (self.k_r * walking(view) + self.k_t) * target
             - self.k_t * view.wheel_angle_rad
             - self.k_hg * view.guidance_torque_nm;
         // Each first-order state exactly, for inputs that hold during the step.

@@ -79,6 +79,17 @@ impl<D: Driver> Driver for WithRemnant<D> {
     }
 }
 
+/// The speed by which a driver looks ahead, m/s: a standing car has no lines of sight by time.
+fn walking(view: &DriverView) -> f64 {
+    view.speed_m_per_s.max(1.0)
+}
+
+/// Angles to the near and to the far point of the road, rad. On an arc the line of sight turns by half of what the road does.
+fn angles_of_sight(view: &DriverView, near_s: f64) -> [f64; 2] {
+    let near = view.lane.e_y_m / (walking(view) * near_s);
+    [near, 0.5 * view.lane.e_theta_rad]
+}
+
 /// A driver of a scenario whose remnant it has.
 #[allow(clippy::unnecessary_wraps, reason = "the type of Make::Part")]
 fn of_scenario(

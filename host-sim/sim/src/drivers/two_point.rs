@@ -5,7 +5,7 @@
 //! Chosen here: the angles of sight are `phi_n = e_y/(v*t_n)` and `phi_f = e_theta/2`; the gains are those of the paper's driver 1, as
 //! angles of sight at 60 km/h; the arm is the paper's, (8).
 
-use super::{AnyDriver, Kind, Make, of_scenario};
+use super::{AnyDriver, Kind, Make, angles_of_sight, of_scenario};
 use crate::kind::Parameter;
 use crate::models::STEP_S;
 use crate::models::arm::Arm;
@@ -31,10 +31,7 @@ impl Driver for TwoPoint {
     }
 
     fn step(&mut self, view: &DriverView) -> f64 {
-        // A standing car has no lines of sight by time.
-        let v = view.speed_m_per_s.max(1.0);
-        let near = view.lane.e_y_m / (v * self.look_ahead_s[0]);
-        let far = 0.5 * view.lane.e_theta_rad;
+        let [near, far] = angles_of_sight(view, self.look_ahead_s[0]);
         let [near_before, far_before] = std::mem::replace(&mut self.last_rad, [near, far]);
         self.target_rad +=
             self.k_n * (near - near_before) + self.k_f * (far - far_before) + self.k_i * STEP_S * near;

@@ -3,7 +3,8 @@
 use super::{Field, suffix};
 
 /// Names that older files have, where they are not the name without its unit or had another unit: table, old name, new name, old unit, and how much of the new unit that is.
-const OLD_NAMES: [(&str, &str, &str, &str, f64); 21] = [
+const OLD_NAMES: [(&str, &str, &str, &str, f64); 22] = [
+    ("", "lane_width", "lane_width_m", "", 1.0),
     ("", "speed", "speed_m_per_s", "km/h", 1.0 / 3.6),
     ("", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
     ("tuning", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
@@ -94,12 +95,21 @@ pub(crate) fn old_name(text: &str, known: impl Fn(&str) -> Vec<&'static Field>) 
         let field = fields.iter().find(same).filter(|field| field.name != name)?;
         Some(format!("{} is called {}", full(name), field.name))
     };
+    let in_tables = |name: &str, tables: &[toml::Value]| {
+        let mut fields = tables.iter().filter_map(toml::Value::as_table).flatten();
+        fields.find_map(|(field, value)| in_table(name, field, value))
+    };
     file.iter().find_map(|(name, value)| {
-        let own = value.as_table().into_iter().flatten();
-        in_table("", name, value).or_else(|| {
-            own.into_iter()
-                .find_map(|(field, value)| in_table(name, field, value))
-        })
+        // The segments of a course stand in its own file, or in a scenario's table `[course]`.
+        let course = if name == "segment" {
+            Some(value)
+        } else {
+            value.get("segment")
+        };
+        let segments = course.and_then(toml::Value::as_array);
+        in_table("", name, value)
+            .or_else(|| in_tables(name, std::slice::from_ref(value)))
+            .or_else(|| in_tables("segment", segments?))
     })
 }
 
@@ -107,6 +117,7 @@ pub(crate) fn old_name(text: &str, known: impl Fn(&str) -> Vec<&'static Field>) 
 mod tests {
     use crate::Scenario;
     use crate::input::InputError;
+    use crate::models::road::Course;
 
     /// The name, and the number in the unit of today where that was another.
     #[test]
@@ -153,6 +164,34 @@ mod tests {
             let none = |name: &str, _: &_| Err(InputError::new(name, "not there"));
             let error = Scenario::from_toml("s.toml", text, none).unwrap_err().to_string();
             assert!(error.contains(expected), "{text:?} gave {error:?}");
+        }
+    }
+
+    #[test]
+    fn an_old_name_in_a_course_is_refused_with_the_new_one() {
+        for (text, expected) in [
+            ("lane_width = 3.5", "lane_width is called lane_width_m"),
+            ("[[segment]]\nlength = 9", "segment.length is called length_m"),
+            (
+                "[[segment]]\nlength_m = 9\ncurvature_start = 0\ncurvature_end = 0",
+                "segment.curvature_end is called curvature_end_per_m",
+            ),
+            (
+                "[[segment]]\nlength_m = 9\nbank = 0.1",
+                "segment.bank is called bank_rad",
+            ),
+        ] {
+            let error = Course::from_toml("c.toml", text).unwrap_err().to_string();
+            assert_eq!(error, format!("c.toml: {expected}"));
+            let course = format!("[course]\nname = 'c'\n{}", text.replace("[[", "[[course."));
+            let none = |name: &str, _: &_| Err(InputError::new(name, "not there"));
+            let error = Scenario::from_toml("s.toml", &course, none)
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.ends_with(expected.trim_start_matches("lane_width ")),
+                "{error}"
+            );
         }
     }
 }

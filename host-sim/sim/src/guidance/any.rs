@@ -18,7 +18,7 @@ pub enum AnyGuidance {
 
 impl AnyGuidance {
     /// None for a manual driver; else over the bus, or past it with exact sensors.
-    pub fn of(scenario: &Scenario) -> Self {
+    pub fn new(scenario: &Scenario) -> Self {
         match (scenario.condition(), scenario.sensors()) {
             (Condition::Manual, _) => Self::None(NoGuidance),
             (_, Sensors::Exact) => Self::Direct(Box::new(Direct::new(scenario.setup()))),

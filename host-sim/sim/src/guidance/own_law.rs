@@ -24,7 +24,7 @@ pub struct OwnLaw<L = Box<dyn Law>> {
     bus: OverBus,
     /// The rates of the errors and of the wheel angle.
     rates: [Rate; 3],
-    asked_nm: f64,
+    demanded_nm: f64,
 }
 
 impl<L: Law> OwnLaw<L> {
@@ -39,13 +39,13 @@ impl<L: Law> OwnLaw<L> {
             law,
             bus: OverBus::new(&setup),
             rates: [Rate::new(tau_s); 3],
-            asked_nm: 0.0,
+            demanded_nm: 0.0,
         }
     }
 
     /// What the law asked for in the last step, N.m.
-    pub fn asked_nm(&self) -> f64 {
-        self.asked_nm
+    pub fn demanded_nm(&self) -> f64 {
+        self.demanded_nm
     }
 
     /// The law.
@@ -91,11 +91,11 @@ impl<L: Law> Guidance for OwnLaw<L> {
 
     fn step(&mut self, observation: &Observation) -> Actuation {
         let view = self.view(observation);
-        self.asked_nm = self.law.ask(&view);
+        self.demanded_nm = self.law.ask(&view);
         // Saturates; NaN is zero.
-        let asked = Torque::from_nm(self.asked_nm);
+        let demanded = Torque::from_nm(self.demanded_nm);
         self.bus
-            .exchange(observation, |ecu, now| ecu.step_with_law(now, asked))
+            .exchange(observation, |ecu, now| ecu.step_with_law(now, demanded))
     }
 
     fn status(&self) -> Option<Status> {

@@ -27,12 +27,18 @@ const INPUTS: usize = 4;
 /// Columns of a transition: the coupled states, then the inputs.
 pub const COLUMNS: usize = COUPLED + INPUTS;
 
-const BETA: usize = 0;
-const YAW_RATE: usize = 1;
-const WHEEL: usize = 2;
-const WHEEL_RATE: usize = 3;
-const ARM: usize = 4;
-const YAW: usize = 5;
+/// Places of the states: beta, r, phi, phi', T_d, psi.
+pub const BETA: usize = 0;
+/// r.
+pub const YAW_RATE: usize = 1;
+/// phi.
+pub const WHEEL: usize = 2;
+/// phi'.
+pub const WHEEL_RATE: usize = 3;
+/// T_d.
+pub const ARM: usize = 4;
+/// psi.
+pub const YAW: usize = 5;
 
 /// What acts on the plant during one step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -309,6 +315,7 @@ fn rotated([x, y]: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::models::runge_kutta;
 
     const V: f64 = 60.0 / 3.6;
 
@@ -368,21 +375,10 @@ mod tests {
             plant.step(&transition, &input);
             let h = STEP_S / 10.0;
             for i in 0..10_u32 {
-                let at = |x: &[f64; 8], part: f64| {
-                    derivatives(
-                        x,
-                        now + (next - now) * (f64::from(i) + part) / 10.0,
-                        t_h,
-                        remnant,
-                        gains,
-                    )
-                };
-                let plus = |k: &[f64; 8], h: f64| std::array::from_fn(|j| x[j] + h * k[j]);
-                let k1 = at(&x, 0.0);
-                let k2 = at(&plus(&k1, h / 2.0), 0.5);
-                let k3 = at(&plus(&k2, h / 2.0), 0.5);
-                let k4 = at(&plus(&k3, h), 1.0);
-                x = std::array::from_fn(|j| x[j] + h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]));
+                x = runge_kutta(&x, h, |x, part| {
+                    let target = now + (next - now) * (f64::from(i) + part) / 10.0;
+                    derivatives(x, target, t_h, remnant, gains)
+                });
             }
         }
         assert!(x[7].abs() > 1.0 && x[2].abs() > 0.01, "the oracle moved: {x:?}");

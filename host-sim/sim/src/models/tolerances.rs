@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::disturbances::SensorErrors;
-use super::real::WorldParameters;
+use super::nonlinear::WorldParameters;
 use super::vehicle::VehicleParameters;
 use crate::fields::fields;
 

@@ -38,6 +38,28 @@ impl VehicleParameters {
         let lever = 2.0 * self.e_t * self.k_f;
         lever * self.k_t / (1.0 + lever / self.k_s)
     }
+
+    /// What the vehicle does while it corners steadily.
+    pub fn steady_cornering(&self) -> SteadyCornering {
+        let l = self.l_f + self.l_r;
+        let steer = self.l_r * self.k_r - self.l_f * self.k_f;
+        SteadyCornering {
+            curvature_gain_per_m: self.k_t / l,
+            stability_factor_s2_per_m2: self.m * steer / (2.0 * l * l * self.k_f * self.k_r),
+            aligning_gain_nm_s2_per_m: self.aligning_stiffness() * self.m * self.l_r / (2.0 * l * self.k_f),
+        }
+    }
+}
+
+/// A vehicle in a steady curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyCornering {
+    /// Curvature of the path per angle of the steering wheel at a crawl, 1/m.
+    pub curvature_gain_per_m: f64,
+    /// How the curvature falls with the speed squared; above zero the vehicle understeers, s2/m2.
+    pub stability_factor_s2_per_m2: f64,
+    /// Aligning torque on the column per lateral acceleration, N.m per m/s2.
+    pub aligning_gain_nm_s2_per_m: f64,
 }
 
 #[cfg(test)]

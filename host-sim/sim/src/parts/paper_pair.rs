@@ -3,8 +3,8 @@
 use super::{Acting, DriverVehicle, DriverView, Motion};
 use crate::models::driver::{ArmGains, DriverParameters, Remnant, Vision};
 use crate::models::hands_answer::HandsAnswer;
+use crate::models::nonlinear::NonlinearPlant;
 use crate::models::plant::{Plant, PlantInput, Transition};
-use crate::models::real::RealPlant;
 use crate::models::step_of;
 use crate::models::tolerances::Car;
 use crate::scenario::{FAILURE_REACTION_S, Scenario};
@@ -30,7 +30,7 @@ pub struct PaperPair {
     held_nm: f64,
     plant: Plant,
     /// What moves in the place of the linear plant, where a scenario asks for what that cannot do.
-    pub nonlinear: Option<Box<RealPlant>>,
+    pub nonlinear: Option<Box<NonlinearPlant>>,
     motor_torque_nm: f64,
 }
 
@@ -74,7 +74,7 @@ impl PaperPair {
             target_rad: [0.0; 2],
             held_nm: 0.0,
             plant: Plant::default(),
-            nonlinear: (!is_linear).then(|| Box::new(RealPlant::new(world, &vehicle, driver, seed))),
+            nonlinear: (!is_linear).then(|| Box::new(NonlinearPlant::new(world, &vehicle, driver, seed))),
             motor_torque_nm: 0.0,
         }
     }

@@ -11,7 +11,7 @@ use crate::fields::Fields;
 use crate::input::{InputError, RangeError};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
-use crate::models::real::WorldParameters;
+use crate::models::nonlinear::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
 use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;

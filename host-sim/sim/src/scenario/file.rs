@@ -10,8 +10,8 @@ use crate::fields::{Field, Fields, InFile, Range};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
-use crate::models::real::WorldParameters;
-use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
+use crate::models::nonlinear::WorldParameters;
+use crate::models::road::{COURSE_FIELDS, Course, LaneChoice, PAPER_COURSE, SEGMENT_FIELDS, SegmentFile};
 use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;
 
@@ -100,7 +100,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         course: if built_in {
             CourseField::Named(PAPER_COURSE.into())
         } else {
-            CourseField::Whole(InlineCourse::of(course))
+            CourseField::Whole(InlineCourse::new(course))
         },
         road: None,
         lane: None,
@@ -148,25 +148,23 @@ pub const TABLES: [(&str, FieldsOf); 8] = [
     (Tolerances::TABLE, Tolerances::fields),
 ];
 
-/// The fields of a table; none of what is no list.
+/// The fields of a table of a scenario file, `segment` for those of a course; none of what is no list.
 pub fn fields_of(table: &str) -> Vec<&'static Field> {
+    match table {
+        "course" => return COURSE_FIELDS.iter().collect(),
+        "segment" => return SEGMENT_FIELDS.iter().collect(),
+        _ => {}
+    }
     let found = TABLES.iter().find(|(name, _)| *name == table);
     found.map_or_else(Vec::new, |(_, fields)| fields())
 }
 
-/// The unit of a field by its path, such as `driver.t_p_s` or `course.segment.1.length`; empty for a number without one, none of
+/// The unit of a field by its path, such as `driver.t_p_s` or `course.segment.1.length_m`; empty for a number without one, none of
 /// what is no number.
 pub fn unit_of(path: &str) -> Option<&'static str> {
     match path.split('.').collect::<Vec<_>>()[..] {
         ["speed_m_per_s"] => Some("m/s"),
-        ["course", "lane_width"] | ["course", "segment", _, "length"] => Some("m"),
-        ["course", "segment", _, field] => match field.split('_').next()? {
-            "curvature" => Some("1/m"),
-            "bank" => Some("rad"),
-            "grade" => Some(""),
-            _ => None,
-        },
-        [table, name] => {
+        [table, name] | ["course", table @ "segment", _, name] => {
             let field = fields_of(table).into_iter().find(|field| field.name == name)?;
             matches!(field.range, Range::Between(..)).then_some(field.unit)
         }
@@ -178,7 +176,7 @@ pub fn unit_of(path: &str) -> Option<&'static str> {
 #[derive(Deserialize, Serialize)]
 #[serde(
     untagged,
-    expecting = "the name of a course, or a [course] with name, lane_width and [[course.segment]]"
+    expecting = "the name of a course, or a [course] with name, lane_width_m and [[course.segment]]"
 )]
 enum CourseField {
     Named(String),
@@ -191,34 +189,12 @@ enum CourseField {
 struct InlineCourse {
     name: String,
     #[serde(default)]
-    lane_width: f64,
+    lane_width_m: f64,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    segment: Vec<InlineSegment>,
+    segment: Vec<SegmentFile>,
     /// The text of an OpenDRIVE file in the place of the other two: a lane that is not made of segments.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     opendrive: Option<String>,
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct InlineSegment {
-    length: f64,
-    curvature_start: f64,
-    curvature_end: f64,
-    #[serde(default)]
-    bank_start: f64,
-    #[serde(default)]
-    bank_end: f64,
-    #[serde(default)]
-    grade_start: f64,
-    #[serde(default)]
-    grade_end: f64,
-}
-
-#[derive(Serialize)]
-struct CourseText<'a> {
-    lane_width: f64,
-    segment: &'a [InlineSegment],
 }
 
 impl CourseField {
@@ -232,28 +208,19 @@ impl CourseField {
 }
 
 impl InlineCourse {
-    fn of(course: &Course) -> Self {
-        let segment = |s: &Segment| InlineSegment {
-            length: s.length_m,
-            curvature_start: s.curvature_start_1pm,
-            curvature_end: s.curvature_end_1pm,
-            bank_start: s.bank_rad[0],
-            bank_end: s.bank_rad[1],
-            grade_start: s.grade[0],
-            grade_end: s.grade[1],
-        };
+    fn new(course: &Course) -> Self {
         if !course.is_of_segments() {
             return Self {
                 name: course.name().into(),
-                lane_width: course.lane_width_m(),
+                lane_width_m: course.lane_width_m(),
                 segment: Vec::new(),
                 opendrive: Some(course.to_opendrive()),
             };
         }
         Self {
             name: course.name().into(),
-            lane_width: course.lane_width_m(),
-            segment: course.segments().iter().map(segment).collect(),
+            lane_width_m: course.lane_width_m(),
+            segment: course.segments().iter().map(SegmentFile::from).collect(),
             opendrive: None,
         }
     }
@@ -264,12 +231,8 @@ impl InlineCourse {
             return Course::from_opendrive(&self.name, text, &LaneChoice::default())
                 .map_err(|e| InputError::new(file, format!("course: {e}")));
         }
-        let text = CourseText {
-            lane_width: self.lane_width,
-            segment: &self.segment,
-        };
-        let text = toml::to_string(&text).map_err(|e| InputError::new(file, e))?;
-        Course::from_toml(&self.name, &text).map_err(|e| InputError::new(file, format!("course: {e}")))
+        Course::of_file(&self.name, self.lane_width_m, &self.segment)
+            .map_err(|e| InputError::new(file, format!("course: {e}")))
     }
 }
 

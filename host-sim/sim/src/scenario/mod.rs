@@ -28,7 +28,7 @@ pub use values::{GuidanceParameters, ScenarioValues};
 use crate::input::{InputError, in_range};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::real::WorldParameters;
+use crate::models::nonlinear::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
 use crate::models::tolerances::{Car, Tolerances};
 use crate::models::vehicle::VehicleParameters;

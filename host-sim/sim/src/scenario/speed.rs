@@ -119,7 +119,7 @@ enum Axis {
 
 /// A point, and how it goes on from there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Point {
+struct SpeedPoint {
     time_s: f64,
     place_m: f64,
     v_m_per_s: f64,
@@ -131,14 +131,14 @@ struct Point {
 pub struct SpeedProfile {
     axis: Axis,
     /// The first is the start; behind the last the speed stays.
-    points: Vec<Point>,
+    points: Vec<SpeedPoint>,
 }
 
 impl SpeedProfile {
     pub(super) fn constant(v_m_per_s: f64) -> Self {
         Self {
             axis: Axis::Time,
-            points: vec![Point {
+            points: vec![SpeedPoint {
                 time_s: 0.0,
                 place_m: 0.0,
                 v_m_per_s,
@@ -177,13 +177,13 @@ impl SpeedProfile {
                 CHANGING_SPEED_M_PER_S,
                 "m/s",
             )?;
-            profile.go_on(number, *at, *v, (field, unit))?;
+            profile.add_point(number, *at, *v, (field, unit))?;
         }
         Ok(profile)
     }
 
     /// Appends a point.
-    fn go_on(
+    fn add_point(
         &mut self,
         number: usize,
         at: f64,
@@ -217,7 +217,7 @@ impl SpeedProfile {
         in_range(&name, rounded, ACCELERATION_M_PER_S2, "m/s2")?;
         from.acceleration_m_per_s2 = acceleration;
         let (time_s, place_m) = (from.time_s + lasts_s, from.place_m + length_m);
-        self.points.push(Point {
+        self.points.push(SpeedPoint {
             time_s,
             place_m,
             v_m_per_s: v,
@@ -286,7 +286,7 @@ impl SpeedProfile {
         (f64::INFINITY, self.points[self.points.len() - 1].v_m_per_s)
     }
 
-    fn last_before(&self, key: impl Fn(&Point) -> f64, x: f64) -> &Point {
+    fn last_before(&self, key: impl Fn(&SpeedPoint) -> f64, x: f64) -> &SpeedPoint {
         let after = self.points.partition_point(|point| key(point) <= x);
         &self.points[after.saturating_sub(1)]
     }

@@ -85,7 +85,7 @@ fn each_is_refused(cases: &[(&str, &str)]) {
 fn a_file_of_another_kind_is_named() {
     each_is_refused(&[
         (
-            "[[segment]]\nlength = 500",
+            "[[segment]]\nlength_m = 500",
             "this is a course: a scenario names it",
         ),
         (
@@ -212,7 +212,7 @@ fn what_happens_in_mid_drive_happens_before_the_run_ends() {
             time_s: failure_s,
             duration_s: None,
         };
-        let course = Course::from_toml("c", "[[segment]]\nlength = 516.7").unwrap();
+        let course = Course::from_toml("c", "[[segment]]\nlength_m = 516.7").unwrap();
         let scenario = Scenario::builder().course(course).failure(failure);
         scenario.build().unwrap()
     };
@@ -238,7 +238,7 @@ fn what_happens_in_mid_drive_happens_before_the_run_ends() {
 
 #[test]
 fn a_course_with_less_than_a_second_to_drive_is_refused() {
-    let course = |length| Course::from_toml("c", &format!("[[segment]]\nlength = {length}")).unwrap();
+    let course = |length| Course::from_toml("c", &format!("[[segment]]\nlength_m = {length}")).unwrap();
     // 1.0 s of look-ahead and 1 s to drive, at 60 km/h, are 33.333 m.
     let short = |length| {
         let scenario = Scenario::builder().course(course(length));
@@ -256,8 +256,8 @@ fn a_course_with_less_than_a_second_to_drive_is_refused() {
 /// What a result holds of its scenario is enough to run it again.
 #[test]
 fn a_scenario_written_and_read_again_is_the_same() {
-    let course = "lane_width = 3.1\n[[segment]]\nlength = 150.5\n\
-                  [[segment]]\nlength = 1000\ncurvature_start = 0.0\ncurvature_end = -0.00123456789012345\n";
+    let course = "lane_width_m = 3.1\n[[segment]]\nlength_m = 150.5\n\
+                  [[segment]]\nlength_m = 1000\ncurvature_start_per_m = 0.0\ncurvature_end_per_m = -0.00123456789012345\n";
     let others = "condition = 'low'\ncourse = 'my road.toml'\nspeed_m_per_s = 19.7\nseed = 7\n\
                   [driver]\nt_p_s = 0.1234567890123\nk_d_nm_per_rad = 3.21\nremnant_sd_nm = 0.1\n\
                   [guidance]\na_2_s_per_m = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime_s = 3.3\n\
@@ -277,12 +277,12 @@ fn a_scenario_written_and_read_again_is_the_same() {
 
 #[test]
 fn a_bad_course_within_a_scenario_is_refused_like_one_in_a_file() {
-    let text = "[course]\nname = 'mine'\nlane_width = 3\n\
-                [[course.segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.5\n";
+    let text = "[course]\nname = 'mine'\nlane_width_m = 3\n\
+                [[course.segment]]\nlength_m = 100\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.5\n";
     let none = |name: &str, _: &LaneChoice| -> Result<Course, _> { panic!("asks for {name}") };
     let error = Scenario::from_toml("s.toml", text, none).unwrap_err().to_string();
     assert!(
-        error.contains("s.toml") && error.contains("segment 1: curvature_end = 0.5"),
+        error.contains("s.toml") && error.contains("segment 1: curvature_end_per_m = 0.5"),
         "{error}"
     );
 }

@@ -5,7 +5,7 @@ use haptic_core::controller::params::{Params, VehicleParams};
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Sensors, Speed};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::real::WorldParameters;
+use crate::models::nonlinear::WorldParameters;
 use crate::models::road::Course;
 use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;
@@ -111,24 +111,13 @@ impl ScenarioValues {
                 ..Params::PAPER.vehicle
             };
         }
-        let VehicleParameters {
-            m,
-            l_f,
-            l_r,
-            k_f,
-            k_r,
-            k_t,
-            b_s,
-            ..
-        } = self.vehicle;
-        let l = l_f + l_r;
-        // The ECU knows understeering vehicles alone: a neutral or oversteering one is told as neutral.
-        let stability = m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r);
+        let steady = self.vehicle.steady_cornering();
         VehicleParams {
-            curvature_gain_per_m: k_t / l,
-            stability_factor_s2_per_m2: stability.max(0.0),
-            aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
-            column_damping_nm_s: b_s,
+            curvature_gain_per_m: steady.curvature_gain_per_m,
+            // The ECU knows understeering vehicles alone: a neutral or oversteering one is told as neutral.
+            stability_factor_s2_per_m2: steady.stability_factor_s2_per_m2.max(0.0),
+            aligning_gain_nm_s2_per_m: steady.aligning_gain_nm_s2_per_m,
+            column_damping_nm_s: self.vehicle.b_s,
             far_time_s,
             near_time_s,
         }

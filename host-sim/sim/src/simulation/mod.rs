@@ -71,14 +71,14 @@ pub struct Simulation<G = AnyGuidance, S = PaperPair> {
 impl Simulation {
     /// The start of a scenario's run, with the guidance that its condition and sensors name.
     pub fn new(scenario: &Scenario) -> Self {
-        Self::with(scenario, AnyGuidance::of(scenario))
+        Self::with(scenario, AnyGuidance::new(scenario))
     }
 }
 
 impl<G: Guidance> Simulation<G> {
     /// The start of a scenario's run with any guidance; the scenario's condition and sensors do not choose it.
     pub fn with(scenario: &Scenario, guidance: G) -> Self {
-        Self::of(scenario, PaperPair::new(scenario), guidance)
+        Self::with_driver_vehicle(scenario, PaperPair::new(scenario), guidance)
     }
 }
 
@@ -86,13 +86,13 @@ impl<G: Guidance, D: Driver, V: Vehicle> Simulation<G, Parts<D, V>> {
     /// The start of a run of any three parts. The scenario has the road, the speed, the failures, the sensors and the
     /// camera; its driver, vehicle and condition are those of nobody, unless a part was made from them.
     pub fn of_parts(scenario: &Scenario, driver: D, vehicle: V, guidance: G) -> Self {
-        Self::of(scenario, Parts::new(driver, vehicle), guidance)
+        Self::with_driver_vehicle(scenario, Parts::new(driver, vehicle), guidance)
     }
 }
 
 impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
     /// The start of a run of any guidance, and any driver with a vehicle.
-    pub fn of(scenario: &Scenario, driver_vehicle: S, guidance: G) -> Self {
+    pub fn with_driver_vehicle(scenario: &Scenario, driver_vehicle: S, guidance: G) -> Self {
         let road = scenario.course().centreline();
         let v = scenario.speed_m_per_s();
         let camera_s = [scenario.guidance().t_n, scenario.guidance().t_f];
@@ -106,7 +106,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             plan,
             guidance,
             driver_vehicle,
-            sensing: Sensing::of(scenario),
+            sensing: Sensing::new(scenario),
             driver_points: PreviewPoints::new(&road, driver_s, v),
             camera: PreviewPoints::new(&road, camera_s, v),
             body: road.tracker(0.0),
@@ -124,7 +124,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
     pub fn view(&self) -> Option<DriverView> {
         let motion = self.driver_vehicle.motion();
         let mut points = self.driver_points.clone();
-        let (lane, points_m) = points.look(&self.road, &self.driver_vehicle, &motion)?;
+        let (lane, points_m) = points.see(&self.road, &self.driver_vehicle, &motion)?;
         let goes_on = self.ending.is_none() && points_m[1] < self.end_m;
         goes_on.then(|| self.perceived(lane, points_m, &motion, self.plan.faults(self.step)))
     }
@@ -159,7 +159,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             return None;
         }
         let motion = self.driver_vehicle.motion();
-        let looked = self.driver_points.look(&self.road, &self.driver_vehicle, &motion);
+        let looked = self.driver_points.see(&self.road, &self.driver_vehicle, &motion);
         let Some((mut preview, points_m)) = looked else {
             return self.diverge();
         };
@@ -171,7 +171,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
         let is_sample = self.step.is_multiple_of(STEPS_PER_SAMPLE);
         let looks = self.guidance.looks_at_road(self.step);
         let lane = if looks || is_sample {
-            let seen = self.camera.look(&self.road, &self.driver_vehicle, &motion);
+            let seen = self.camera.see(&self.road, &self.driver_vehicle, &motion);
             let Some((errors, _)) = seen else {
                 return self.diverge();
             };

@@ -120,7 +120,7 @@ pub fn simulate(scenario: &Scenario) -> Run {
 /// As [`simulate`]; `watch` sees every step.
 pub fn observe(scenario: &Scenario, watch: impl FnMut(&Outcome)) -> Run {
     // Each kind compiled for itself: a step then chooses nothing.
-    match AnyGuidance::of(scenario) {
+    match AnyGuidance::new(scenario) {
         AnyGuidance::None(guidance) => Simulation::with(scenario, guidance).run_observed(watch),
         AnyGuidance::Direct(guidance) => Simulation::with(scenario, *guidance).run_observed(watch),
         AnyGuidance::OverBus(guidance) => Simulation::with(scenario, *guidance).run_observed(watch),

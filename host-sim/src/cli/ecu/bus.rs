@@ -15,7 +15,7 @@ pub(in crate::cli) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("ecu bus")?;
-    let load = Load::of(table());
+    let load = Load::new(table());
     let report = load.report();
     output.show(&report, &report.stamp(&load), load.load <= load.max_load)
 }

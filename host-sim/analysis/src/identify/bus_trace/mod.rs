@@ -91,8 +91,8 @@ pub fn open_recording_with(
     path: &Path,
     recording: &Recording<'_>,
 ) -> Result<(DriveLog, Option<&'static str>), LogError> {
-    let bytes = std::fs::read(path).map_err(|e| LogError::of(path.display(), e))?;
-    of_text(&bytes, recording).map_err(|e| LogError::of(path.display(), e))
+    let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
+    of_text(&bytes, recording).map_err(|e| LogError::in_file(path.display(), e))
 }
 
 /// A log of the text of either kind, and the sentence about it.
@@ -131,7 +131,7 @@ pub(super) fn dbc_text(dbc: Option<&Path>) -> Result<String, LogError> {
     let Some(dbc) = dbc else {
         return Ok(HAPTIC_DBC.to_owned());
     };
-    std::fs::read_to_string(dbc).map_err(|e| LogError::of(dbc.display(), e))
+    std::fs::read_to_string(dbc).map_err(|e| LogError::in_file(dbc.display(), e))
 }
 
 /// A signal over time.
@@ -148,7 +148,7 @@ const GUIDANCE: usize = 4;
 fn read_trace(records: &[CandumpFrame], dbc: &str, how: &Recording<'_>) -> Result<DriveLog, LogError> {
     let dbc = Dbc::try_from(dbc).map_err(|e| format!("the DBC file is not understood: {e}"))?;
     let mut audits: Vec<Audit> = Vec::new();
-    let mut course = |name| Course::of(name, &dbc, records, &mut audits);
+    let mut course = |name| Course::from_frames(name, &dbc, records, &mut audits);
 
     let mut e_y = course("LanePreview_LateralError")?;
     let mut e_theta = course("LanePreview_YawError")?;
@@ -254,7 +254,7 @@ fn used(courses: &[Course], zero_s: f64, stretches: &[(f64, f64)]) -> Result<Ran
 
 impl Course {
     /// The signal in SI units, from all frames that carry it.
-    fn of(
+    fn from_frames(
         name: &'static str,
         dbc: &Dbc,
         records: &[CandumpFrame],

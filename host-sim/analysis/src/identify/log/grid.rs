@@ -47,7 +47,7 @@ impl Grid {
     ///
     /// # Errors
     /// A time that is too short.
-    pub(super) fn of(time: &[f64], usual: f64) -> Result<Self, LogError> {
+    pub(super) fn new(time: &[f64], usual: f64) -> Result<Self, LogError> {
         let span = time[time.len() - 1] - time[0];
         if span < SHORTEST_S {
             return refuse(too_short(span));
@@ -186,7 +186,7 @@ impl Grid {
                         let middle = 0.5 * (time[k] + time[k + 1]);
                         return if t < middle { column[k] } else { column[k + 1] };
                     }
-                    Weights::between(time, k, t, *longest, |i| column[i].is_finite()).of(&column)
+                    Weights::between(time, k, t, *longest, |i| column[i].is_finite()).value(&column)
                 })
                 .collect(),
         }
@@ -234,7 +234,7 @@ impl Weights {
         }
     }
 
-    fn of(&self, u: &[f64]) -> f64 {
+    fn value(&self, u: &[f64]) -> f64 {
         let rows = &u[self.first..self.first + self.count];
         rows.iter().zip(&self.weight).map(|(u, w)| u * w).sum()
     }

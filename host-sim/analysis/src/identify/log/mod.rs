@@ -112,7 +112,7 @@ impl From<String> for LogError {
 
 impl LogError {
     /// Of a file, an option or a channel, which the text then begins with.
-    pub(crate) fn of(name: impl fmt::Display, error: impl fmt::Display) -> Self {
+    pub(crate) fn in_file(name: impl fmt::Display, error: impl fmt::Display) -> Self {
         Self(format!("{name}: {error}"))
     }
 
@@ -197,8 +197,8 @@ impl DriveLog {
     /// # Errors
     /// The file cannot be read, or what it holds is refused; the text begins with the path.
     pub fn open(path: &Path, manual: bool) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(|e| LogError::of(path.display(), e))?;
-        Self::read(BufReader::new(file), manual).map_err(|e| LogError::of(path.display(), e))
+        let file = File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
+        Self::read(BufReader::new(file), manual).map_err(|e| LogError::in_file(path.display(), e))
     }
 
     /// Reads and checks a log from `source`; see [`DriveLog::open`].
@@ -327,7 +327,7 @@ impl DriveLog {
             column.truncate(used.end);
             column.split_off(used.start)
         });
-        let grid = Grid::of(&time, usual_s)?;
+        let grid = Grid::new(&time, usual_s)?;
         let mut c = 0;
         let mut signals = signals.map(|column| {
             c += 1;

@@ -1,15 +1,17 @@
-//! Is the driver the same throughout? A score test of a change at an unknown instant.
+//! Tests whether the driver is the same throughout a recording: a score test for a change at an unknown instant.
 //!
-//! With the regressors x_t of a row (the negative derivatives of its prediction error e_t by gains, K_hg, t_p and the constants),
-//! a change by delta along the direction d, of which the share r_t has come at row t, is one more regressor,
-//! `z_t = r_t d' x_t`. What the other parameters take up of it is taken out, and so is an offset of T_d that changes with it:
-//! a sensor that drifts is no driver who changes. Such an offset is also tried alone, and so is one of e_y, which makes a slope of
-//! T_d. With z the rest, freeing delta adds `(sum e_t z_t)^2/(s^2 sum z_t^2)` to twice the log likelihood, to first order
-//! (Andrews, "Tests for parameter instability and structural change with unknown change point", Econometrica 61, 1993). The
-//! largest over instants and directions is held against [`LEVEL`]. Sums over blocks of [`BLOCK_S`] hold all that this takes.
+//! Let x_t be the regressors of row t: the negative derivatives of its prediction error e_t with respect to gains,
+//! K_hg, t_p and constants. A change of the parameters by delta in the direction d, of which the share r_t has
+//! happened at row t, acts like one more regressor, `z_t = r_t d' x_t`. The part of z that the other parameters can
+//! explain is removed, and so is the part that a simultaneous change of the offset of T_d explains, because a
+//! drifting sensor is not a changed driver. A change of that offset alone is tested too, and a change of the offset
+//! of e_y, which acts as a slope of T_d. With z the remainder, estimating delta adds
+//! `(sum e_t z_t)^2/(s^2 sum z_t^2)` to twice the log likelihood, to first order (Andrews, "Tests for parameter
+//! instability and structural change with unknown change point", Econometrica 61, 1993). The largest value over all
+//! instants and directions is compared with [`LEVEL`]. Everything is computed from sums over blocks of [`BLOCK_S`].
 //!
-//! An instant's interval is where that falls short of its largest by at most [`super::change_score`]'s `WITHIN_95` (Hansen,
-//! "Sample splitting and threshold estimation", Econometrica 68, 2000).
+//! The interval of the instant is where the value is below its maximum by at most `WITHIN_95` of
+//! [`super::change_score`] (Hansen, "Sample splitting and threshold estimation", Econometrica 68, 2000).
 
 use std::ops::Range;
 
@@ -23,14 +25,16 @@ use crate::identify::change::{Change, Constancy, E_Y, T_D};
 use crate::identify::search::covariance;
 use crate::identify::verdict::{self, Refutation};
 
-/// What a change has to add to twice the log likelihood: two constant drivers in a hundred at most are said to have changed.
+/// How much a change has to add to twice the log likelihood to be declared. At most two in a hundred constant drivers
+/// are then declared changed.
 const LEVEL: f64 = 16.0;
-/// From where on a change is likely enough to be an error of the estimates.
+/// Above this value a change is not declared yet, but widens the errors of the estimates.
 const DOUBT: f64 = 10.0;
 
 impl Problem<'_> {
-    /// Whether the driver was the same throughout; none if there is nothing to estimate. A change that is likely, but not sure,
-    /// widens `errors` by how far the driver then is from the estimate, over the time of the record.
+    /// Whether the driver was the same throughout; `None` if there is nothing to estimate. A change that is likely
+    /// but not certain widens `errors` by the mean squared distance of the changed driver from the estimate over the
+    /// recording.
     pub(super) fn constancy(
         &self,
         p: &[f64],
@@ -82,7 +86,8 @@ impl Problem<'_> {
         Some(constancy)
     }
 
-    /// What the torques on the column say of the sensors before and after the middle of a change.
+    /// Whether the balance of the column's torques shows that a sensor changed, before against after the middle of a
+    /// change.
     pub(super) fn changed_sensor(&self, change: &Change, manual: bool) -> Option<Refutation> {
         let middle_s = 0.5 * (change.at_s[0] + change.at_s[1]);
         let side = |rows: Range<usize>| {
@@ -95,7 +100,7 @@ impl Problem<'_> {
         verdict::of_changed_sensor(change, self.span_s(), [&sides[0], &sides[1]])
     }
 
-    /// From when to when rows are used, s.
+    /// First and last time of the rows in use, s.
     pub(super) fn span_s(&self) -> [f64; 2] {
         let ends = self.stretches.first().zip(self.stretches.last());
         ends.map_or([0.0; 2], |(first, last)| {

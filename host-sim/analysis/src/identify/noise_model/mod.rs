@@ -32,6 +32,7 @@ mod report;
 mod restricted;
 mod rows;
 mod sums;
+mod uncertainty;
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
-//! From the end of the search to the verdict: standard errors, what is identified, what is determined instead, the
-//! disturbance, and the residuals with their tests.
+//! The result of an identification, from the end of the search to the verdict: which parameters are identified, what is determined
+//! instead, the disturbance, and the residuals with their tests. Standard errors are in `uncertainty`.
 //!
 //! What a parameter needs to be called identified is said in [`crate::identify`]'s result; the loss, and what was
 //! searched, are the parent module's.
@@ -8,10 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::delays::filter;
 use super::sums::Rows;
-use super::{
-    COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA,
-    VARIATION_WIDTHS,
-};
+use super::uncertainty::{ActiveBounds, Uncertainty};
+use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, RHO, T_NMS, T_P, THETA, VARIATION_WIDTHS};
 use crate::identify::balance::balance;
 use crate::identify::diagnostics;
 use crate::identify::log::DriveLog;
@@ -19,22 +17,20 @@ use crate::identify::options::{FixError, Options};
 use crate::identify::paper::TABLE_4;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::{
-    Combination, Correlation, Identification, Parameter, Parameters, Remnant, Start, Traces,
+    Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant, Start, Traces,
 };
-use crate::identify::search::{Bounds, Optimum, covariance};
+use crate::identify::search::{Bounds, Optimum};
 
-/// Standard errors by which a bound may trim an optimum; beyond, the data contradict it.
-const TRIMMED_AT_MOST: f64 = 3.0;
-
-/// Share of its variation interval by which a parameter may pass a bound all the same: in a record without noise,
-/// standard errors are that small.
-const TRIMMED_SHARE: f64 = 0.01;
+/// The driver's parameters, and what else was estimated, as a result names them.
+struct Named {
+    parameters: Parameters,
+    /// What the muscle and the delays of the sensors came to, where they were estimated.
+    beyond: Vec<(&'static str, Parameter)>,
+    /// Why the gains could not be split, if they could not.
+    not_split: Option<FixError>,
+}
 
 impl Problem<'_> {
-    #[expect(
-        clippy::too_many_lines,
-        reason = "one value with many fields, each from what stands above it"
-    )]
     pub(super) fn report(
         &self,
         prepared: &Prepared,
@@ -42,81 +38,82 @@ impl Problem<'_> {
         optimum: &Optimum,
         starts: Vec<Start>,
     ) -> Identification {
-        let log = &prepared.log;
-        let p = &optimum.point;
-        // A disturbance on its bound (no sensor noise, say) is taken as known: only the driver's own bounds may
-        // have held the estimate back.
-        let known =
-            |i: usize| !self.is_free(i) || ([RHO, THETA].contains(&i) && self.bounds[i].touches(p[i]));
-        let free: Vec<usize> = (0..self.size()).filter(|&i| !known(i)).collect();
-        let rows = self.row_count();
-        let variance = 2.0 * optimum.quadratic.loss / rows.saturating_sub(free.len()).max(1) as f64;
-        let error_variance = variance.max(SMALLEST_ERROR_NM.powi(2));
-        // The corner that the restricted likelihood gave was estimated too.
-        let corner = (self.corner_restricted).then_some(RHO);
-        let estimated: Vec<usize> = free.iter().copied().chain(corner).collect();
-        let inverse = covariance(&optimum.quadratic.hessian, &estimated);
-        let mut errors = &inverse * error_variance;
-        let delay_profile = self.profile(
-            p,
-            optimum.quadratic.loss,
-            error_variance,
-            errors[(T_P, T_P)].sqrt(),
-        );
-        let kept = self.kept_rows(p);
-        self.widen(
-            &mut errors,
-            p,
-            &optimum.quadratic.hessian,
-            &estimated,
-            &delay_profile,
-            &kept,
-        );
-        let core: Vec<usize> = free
-            .iter()
-            .copied()
-            .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
-            .collect();
-        let doubted = self.doubted(&prepared.lane_doubts, p, &kept, &inverse);
-        let mut alternatives = self.alternatives(p, &core, error_variance);
-        let drawn_with = alternatives
-            .iter_mut()
-            .find(|a| a.place == T_NMS)
-            .map(|a| doubted.widen(a, error_variance));
-        // What else may be estimated (the muscle, delays of sensors, the share of white noise) counts as known there.
-        let within: Vec<usize> = core
-            .iter()
-            .copied()
-            .chain(corner)
-            .filter(|&i| i <= RHO || i >= COUNT)
-            .collect();
-        let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian, &kept);
-        let trim = self.trim(optimum, &free, &errors, error_variance);
-        errors += doubted.covariance(self.size());
-        let constancy = self.constancy(p, &kept, error_variance, &mut errors);
-        let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
-        if !options.t_nms_known && !self.is_free(T_NMS) {
-            at_t_nms = Some(self.at_t_nms(&unbiased, &errors, &trim.pull));
-            drawn = self.widen_by_t_nms(&mut errors, &alternatives, drawn_with.as_ref());
+        let (log, p) = (&prepared.log, &optimum.point);
+        let (found, kept) = self.uncertainty(prepared, options, optimum);
+        let Named {
+            parameters,
+            beyond,
+            not_split,
+        } = self.named_parameters(p, options, &found);
+        let balance = balance(log, &prepared.stretches, options.manual);
+        let mut notes = self.notes(log, options, &parameters, &found.active, &starts);
+        notes.extend(not_split.map(|e| e.0));
+        let combinations = self.combinations_of_ridge(options, &parameters, &found);
+        if !combinations.is_empty() {
+            notes.push(
+                "The guidance torque moves with the driver's own inputs: k_hg and the gains can be traded for each \
+                 other without changing the loss. What is determined are the combinations."
+                    .to_owned(),
+            );
         }
+        let (traces, predicted) = self.traces(log, kept);
+        let fit = |model: &[f64]| diagnostics::fit_percent(&traces.measured_nm, model.iter().copied());
+        let mut identification = Identification {
+            method: "noise-model",
+            fit_percent: fit(&traces.simulated_nm),
+            fit_percent_predicted: Some(fit(&predicted)),
+            fit_percent_wheel_angle: None,
+            parameters,
+            at_t_nms: found.at_t_nms,
+            combinations,
+            correlation: Correlation::new(&NAMES, &found.errors, &found.free),
+            remnant: Some(remnant(p[RHO], p[THETA], found.variance, self.signals.dt_s)),
+            whiteness: diagnostics::whiteness(&traces.residual_nm, 2),
+            input_correlation: self.input_correlation(log, p, &traces),
+            preflight: Some(prepared.preflight.clone()),
+            balance,
+            constancy: found.constancy,
+            delay_profile: found.delay_profile,
+            refuted: Vec::new(),
+            assumed: Vec::new(),
+            beyond,
+            starts,
+            loss_history: optimum.history.clone(),
+            termination: optimum.termination,
+            rows: self.row_count(),
+            notes,
+            traces,
+        };
+        self.judge(
+            &mut identification,
+            options,
+            optimum,
+            &found.alternatives,
+            &found.errors,
+        );
+        identification
+    }
+
+    /// Each parameter with its estimate and interval, or as not identified.
+    fn named_parameters(&self, p: &[f64], options: &Options, found: &Uncertainty) -> Named {
         let parameter = |i: usize| {
             if !self.is_free(i) {
                 Parameter::fixed(p[i])
-            } else if trim.contradicted[i] {
-                Parameter::not_identified(unbiased[i], self.bounds[i])
+            } else if found.active.contradicted[i] {
+                Parameter::not_identified(found.unbiased[i], self.bounds[i])
             } else {
                 Parameter::estimated(
-                    unbiased[i],
-                    trim.pull[i],
-                    errors[(i, i)],
-                    drawn[i],
+                    found.unbiased[i],
+                    found.active.pull[i],
+                    found.errors[(i, i)],
+                    found.drawn[i],
                     self.bounds[i],
                     VARIATION_WIDTHS[i],
                 )
             }
         };
         let gains = [0, 1, 2].map(parameter);
-        let split = split_scale(&gains, &trim.pull, &errors, options);
+        let split = split_scale(&gains, &found.active.pull, &found.errors, options);
         let (k_d, a) = split
             .clone()
             .unwrap_or((Parameter::ABSENT, [Parameter::ABSENT; 3]));
@@ -141,27 +138,37 @@ impl Problem<'_> {
             gain_2: named(gains[1]),
             gain_3: named(gains[2]),
         };
-        if let Some(at_t_nms) = &at_t_nms {
+        if let Some(at_t_nms) = &found.at_t_nms {
             parameters.hold(at_t_nms);
         }
-        let balance = balance(log, &prepared.stretches, options.manual);
-        let mut notes = self.notes(log, options, &parameters, &trim, &starts);
-        notes.extend(split.err().map(|e| e.0));
-        let along_k_hg = trim.bounds.iter().all(|&(i, _)| i == K_HG);
-        let combinations = if !options.manual && !k_hg.identified && along_k_hg {
-            self.combinations(&unbiased, &errors)
+        let beyond = [K_NMS, T_NMS, H_LATE, D_LATE]
+            .into_iter()
+            .filter(|&i| self.is_free(i))
+            .filter_map(|i| Some((NAMES[i]?, parameter(i))));
+        Named {
+            parameters,
+            beyond: beyond.collect(),
+            not_split: split.err(),
+        }
+    }
+
+    /// The combinations that are determined where K_hg alone is not.
+    fn combinations_of_ridge(
+        &self,
+        options: &Options,
+        parameters: &Parameters,
+        found: &Uncertainty,
+    ) -> Vec<Combination> {
+        let along_k_hg = found.active.bounds.iter().all(|&(i, _)| i == K_HG);
+        if !options.manual && !parameters.k_hg.identified && along_k_hg {
+            self.combinations(&found.unbiased, &found.errors)
         } else {
             Vec::new()
-        };
-        if !combinations.is_empty() {
-            notes.push(
-                "The guidance torque moves with the driver's own inputs: k_hg and the gains can be traded for each \
-                 other without changing the loss. What is determined are the combinations."
-                    .to_owned(),
-            );
         }
-        let (traces, predicted) = self.traces(log, kept);
-        let fit = |model: &[f64]| diagnostics::fit_percent(&traces.measured_nm, model.iter().copied());
+    }
+
+    /// Correlation of the residuals with each filtered input.
+    fn input_correlation(&self, log: &DriveLog, p: &[f64], traces: &Traces) -> Vec<InputCorrelation> {
         let filtered = |u: &[f64]| self.filtered(p, u);
         let inputs = [
             ("e_y_m", filtered(&log.e_y_m)),
@@ -170,93 +177,7 @@ impl Problem<'_> {
             ("guidance_torque_nm", filtered(&log.guidance_torque_nm)),
         ];
         let inputs: Vec<(&'static str, &[f64])> = inputs.iter().map(|(n, u)| (*n, u.as_slice())).collect();
-        let mut found = Identification {
-            method: "noise-model",
-            fit_percent: fit(&traces.simulated_nm),
-            fit_percent_predicted: Some(fit(&predicted)),
-            fit_percent_wheel_angle: None,
-            parameters,
-            at_t_nms,
-            combinations,
-            correlation: Correlation::new(&NAMES, &errors, &free),
-            remnant: Some(remnant(p[RHO], p[THETA], variance, self.signals.dt_s)),
-            whiteness: diagnostics::whiteness(&traces.residual_nm, 2),
-            input_correlation: diagnostics::input_correlation(
-                &traces.residual_nm,
-                &inputs,
-                self.signals.dt_s,
-            ),
-            preflight: Some(prepared.preflight.clone()),
-            balance,
-            constancy,
-            delay_profile,
-            refuted: Vec::new(),
-            assumed: Vec::new(),
-            beyond: [K_NMS, T_NMS, H_LATE, D_LATE]
-                .into_iter()
-                .filter(|&i| self.is_free(i))
-                .filter_map(|i| Some((NAMES[i]?, parameter(i))))
-                .collect(),
-            starts,
-            loss_history: optimum.history.clone(),
-            termination: optimum.termination,
-            rows,
-            notes,
-            traces,
-        };
-        self.judge(&mut found, options, optimum, &alternatives, &errors);
-        found
-    }
-
-    /// The driver's parameters less the bias of a finite record, within their bounds.
-    fn unbiased(&self, p: &[f64], estimated: &[usize], hessian: &DMatrix<f64>, rows: &Rows) -> Vec<f64> {
-        let bias = self.bias(rows, &covariance(hessian, estimated));
-        let mut out = p.to_vec();
-        for i in estimated.iter().copied().filter(|&i| i <= T_P) {
-            out[i] = (p[i] - bias[i]).clamp(self.bounds[i].low, self.bounds[i].high);
-        }
-        out
-    }
-
-    /// What the driver's bounds did to the optimum.
-    fn trim(&self, optimum: &Optimum, free: &[usize], errors: &DMatrix<f64>, variance: f64) -> Trim {
-        let held: Vec<usize> = free
-            .iter()
-            .copied()
-            .filter(|&i| self.bounds[i].touches(optimum.point[i]))
-            .collect();
-        let pull = if held.is_empty() {
-            DVector::zeros(errors.nrows())
-        } else {
-            let mut gradient = optimum.quadratic.gradient.clone();
-            if self.corner_restricted {
-                // No bound holds it: the restricted likelihood has its own gradient.
-                gradient[RHO] = 0.0;
-            }
-            -(errors * gradient) / variance
-        };
-        let beyond = |i: usize, errors: &DMatrix<f64>| {
-            pull[i].is_finite() && pull[i].abs() > TRIMMED_AT_MOST * errors[(i, i)].sqrt()
-        };
-        let bounds: Vec<usize> = held
-            .into_iter()
-            .filter(|&i| beyond(i, errors) && pull[i].abs() > TRIMMED_SHARE * VARIATION_WIDTHS[i])
-            .collect();
-        let contradicted = if bounds.is_empty() {
-            [false; COUNT]
-        } else {
-            let others: Vec<usize> = free.iter().copied().filter(|i| !bounds.contains(i)).collect();
-            let with_bounds = covariance(&optimum.quadratic.hessian, &others) * variance;
-            std::array::from_fn(|i| beyond(i, &with_bounds))
-        };
-        Trim {
-            bounds: bounds
-                .into_iter()
-                .map(|i| (i, optimum.point[i] + pull[i]))
-                .collect(),
-            contradicted,
-            pull,
-        }
+        diagnostics::input_correlation(&traces.residual_nm, &inputs, self.signals.dt_s)
     }
 
     /// What stays put along the ridge of K_hg: each other parameter minus its regression on K_hg.
@@ -283,7 +204,7 @@ impl Problem<'_> {
         log: &DriveLog,
         options: &Options,
         found: &Parameters,
-        trim: &Trim,
+        active: &ActiveBounds,
         starts: &[Start],
     ) -> Vec<String> {
         let mut notes = Vec::new();
@@ -299,16 +220,16 @@ impl Problem<'_> {
                 "guidance_torque_nm is zero throughout: k_hg has no effect; was it a --manual drive?"
                     .to_owned(),
             );
-        } else if !options.manual && !found.k_hg.identified && !trim.contradicted[K_HG] {
+        } else if !options.manual && !found.k_hg.identified && !active.contradicted[K_HG] {
             notes.push(
                 "k_hg is not identified: the standard error is too large a share of its range 0 to 1. A probe \
                  torque makes it readable; beside a probe, a longer drive or a stronger one does."
                     .to_owned(),
             );
         }
-        for &(i, unbounded) in &trim.bounds {
+        for &(i, unbounded) in &active.bounds {
             let moved: Vec<&str> = (0..COUNT)
-                .filter(|&j| trim.contradicted[j])
+                .filter(|&j| active.contradicted[j])
                 .filter_map(|j| NAMES[j])
                 .collect();
             notes.push(format!(
@@ -385,16 +306,6 @@ impl Problem<'_> {
         }
         all
     }
-}
-
-/// What the driver's bounds did to the optimum.
-struct Trim {
-    /// How far the unbounded optimum is from the bounded one, to first order.
-    pull: DVector<f64>,
-    /// Parameters on a bound that the data contradict, and where they would be without it.
-    bounds: Vec<(usize, f64)>,
-    /// Those, and all that move with them.
-    contradicted: [bool; COUNT],
 }
 
 /// Splits the gains with what the caller knows of the scale: K_d, or one a_i.

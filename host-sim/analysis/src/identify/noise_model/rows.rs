@@ -3,8 +3,7 @@
 //!
 //! Columns lie side by side in a row, all through the filter of the disturbance, `(1 - rho/q)/(1 - theta/q)`: eight, or
 //! sixteen where what is usually known of muscle and sensors has its derivatives too. They are the negative derivatives
-//! by the parameters and, behind them, by the stretch's constant. In the *light* layout rho and theta are given, so that
-//! the columns do not depend on each other: the derivatives by gains, K_hg, t_p and the constant, and the error itself.
+//! by the parameters and, behind them, by the stretch's constant.
 //!
 //! The filter starts as if the first row of a stretch had gone on for ever: for the slow signals here that is nearer to
 //! the truth than silence, and the first innovation is not the whole disturbance.
@@ -20,9 +19,6 @@ use crate::identify::wide::{BLOCK, window};
 /// Columns side by side, as many as registers hold, for [`CORE`] and for all parameters.
 pub(super) const FEW: usize = 8;
 pub(super) const MANY: usize = 16;
-/// The stretch's constant, and the error, in the light layout.
-pub(super) const LIGHT_CONSTANT: usize = 5;
-pub(super) const LIGHT_ERROR: usize = 6;
 
 /// Sums of products of columns; those with the column's own number or a lower one count.
 pub(super) type Gram<const L: usize> = [[f64; L]; L];
@@ -210,40 +206,8 @@ pub(super) fn fill(s: &Signals, p: &Point, rows: Range<usize>, block: &mut Block
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn filter_few(p: &Point, block: &Block, count: usize, out: &mut Filtered<FEW>) {
+pub(super) fn filter_block<const L: usize>(p: &Point, block: &Block, count: usize, out: &mut Filtered<L>) {
     out.filter(p, block, count);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn filter_many(p: &Point, block: &Block, count: usize, out: &mut Filtered<MANY>) {
-    out.filter(p, block, count);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn light(s: &Signals, p: &Point, rows: Range<usize>, block: &mut Block, out: &mut Filtered<FEW>) {
-    let count = rows.end - rows.start;
-    block.fill(s, p, rows);
-    let (rho, theta) = (p.rho, p.theta);
-    if !out.begun {
-        out.begun = true;
-        let gain = (1.0 - rho) / (1.0 - theta);
-        let [a, b, c, d, e] = block.driver(0);
-        out.last = [a, b, c, d, e, 1.0, block.disturbance[0], 0.0];
-        for i in 0..FEW {
-            out.state[i] = gain * out.last[i];
-        }
-    }
-    let (mut state, mut last) = (out.state, out.last);
-    for k in 0..count {
-        let [a, b, c, d, e] = block.driver(k);
-        let new = [a, b, c, d, e, 1.0, block.disturbance[k], 0.0];
-        for i in 0..FEW {
-            state[i] = theta * state[i] + (new[i] - rho * last[i]);
-        }
-        last = new;
-        out.columns[k] = state;
-    }
-    (out.state, out.last) = (state, last);
 }
 
 /// Adds the products of some of the columns, numbers `FROM` to `TO`, with the first `WIDTH`: as many sums as the registers
@@ -276,19 +240,14 @@ fn products<const L: usize, const FROM: usize, const TO: usize, const WIDTH: usi
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_few(gram: &mut Gram<FEW>, rows: &[[f64; FEW]]) {
-    products::<FEW, 0, 4, 4>(gram, rows);
-    products::<FEW, 4, 6, 8>(gram, rows);
-    products::<FEW, 6, 8, 8>(gram, rows);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_many(gram: &mut Gram<MANY>, rows: &[[f64; MANY]]) {
-    products::<MANY, 0, 4, 4>(gram, rows);
-    products::<MANY, 4, 6, 8>(gram, rows);
-    products::<MANY, 6, 8, 8>(gram, rows);
-    products::<MANY, 8, 10, 12>(gram, rows);
-    products::<MANY, 10, 12, 12>(gram, rows);
+pub(super) fn add_products<const L: usize>(gram: &mut Gram<L>, rows: &[[f64; L]]) {
+    products::<L, 0, 4, 4>(gram, rows);
+    products::<L, 4, 6, 8>(gram, rows);
+    products::<L, 6, 8, 8>(gram, rows);
+    if L == MANY {
+        products::<L, 8, 10, 12>(gram, rows);
+        products::<L, 10, 12, 12>(gram, rows);
+    }
 }
 
 /// The errors' squares, and their products with the columns.
@@ -320,11 +279,6 @@ impl<const L: usize> OfErrors<L> {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_errors_few(to: &mut OfErrors<FEW>, rows: &Filtered<FEW>, count: usize) {
-    to.add(rows, count);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_errors_many(to: &mut OfErrors<MANY>, rows: &Filtered<MANY>, count: usize) {
+pub(super) fn add_errors<const L: usize>(to: &mut OfErrors<L>, rows: &Filtered<L>, count: usize) {
     to.add(rows, count);
 }

@@ -5,8 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::rows::{
-    Block, FEW, Filtered, Gram, LIGHT_CONSTANT, LIGHT_ERROR, MANY, OfErrors, Point, add_errors_few,
-    add_errors_many, add_few, add_many, fill, filter_few, filter_many, light,
+    Block, FEW, Filtered, Gram, MANY, OfErrors, Point, add_errors, add_products, fill, filter_block,
 };
 use super::{CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, Problem, RHO, SMALLEST_ERROR_NM, T_P, THETA};
 use crate::identify::search::Quadratic;
@@ -45,68 +44,43 @@ impl Problem<'_> {
     /// Loss, and its derivatives by gains, K_hg, the constants and, `with_delay`, t_p, at `p`; those by the others are left at
     /// zero. By all but t_p the quadratic is exact.
     pub(super) fn light_sums(&self, p: &[f64], with_delay: bool) -> Quadratic {
-        let mut sums = Sums::new(self, if with_delay { T_P + 1 } else { T_P });
-        let (mut block, mut filtered) = (Block::EMPTY, Filtered::SILENT);
-        for stretch in 0..self.stretches.len() {
-            let point = self.point(p, stretch);
-            let mut gram: Gram<FEW> = Default::default();
-            filtered.begun = false;
-            for rows in self.blocks_of(stretch) {
-                let count = rows.len();
-                light(&self.signals, &point, rows, &mut block, &mut filtered);
-                add_few(&mut gram, &filtered.columns[..count]);
-            }
-            let of_errors = OfErrors {
-                squares: gram[LIGHT_ERROR][LIGHT_ERROR],
-                by_column: gram[LIGHT_ERROR],
-            };
-            sums.add(stretch, &gram, LIGHT_CONSTANT, &of_errors);
-        }
-        self.with_prior(p, sums.quadratic).0
+        let sums = self.sums::<FEW>(p, if with_delay { T_P + 1 } else { T_P });
+        self.with_prior(p, sums).0
     }
 
     /// Loss, and its derivatives by the parameters of [`CORE`] and the constants, at `p`; those by the others are left at zero.
     pub(super) fn core_sums(&self, p: &[f64]) -> Quadratic {
-        let mut sums = Sums::new(self, CORE);
-        let (mut block, mut filtered) = (Block::EMPTY, Filtered::SILENT);
-        for stretch in 0..self.stretches.len() {
-            let point = self.point(p, stretch);
-            let mut gram: Gram<FEW> = Default::default();
-            let mut of_errors = OfErrors::NONE;
-            filtered.begun = false;
-            for rows in self.blocks_of(stretch) {
-                let count = rows.len();
-                fill(&self.signals, &point, rows, &mut block);
-                filter_few(&point, &block, count, &mut filtered);
-                add_few(&mut gram, &filtered.columns[..count]);
-                add_errors_few(&mut of_errors, &filtered, count);
-            }
-            sums.add(stretch, &gram, CORE, &of_errors);
-        }
-        self.with_prior(p, sums.quadratic).0
+        self.with_prior(p, self.sums::<FEW>(p, CORE)).0
     }
 
     /// Loss, gradient and Gauss-Newton matrix by all parameters at `p`.
     pub(super) fn all_sums(&self, p: &[f64]) -> Quadratic {
-        let mut sums = Sums::new(self, COUNT);
+        self.with_prior_by_t_nms(p, self.sums::<MANY>(p, COUNT))
+    }
+
+    /// Of the record alone, by the first `parameters` and the constants.
+    fn sums<const L: usize>(&self, p: &[f64], parameters: usize) -> Quadratic {
+        let mut sums = Sums::new(self, parameters);
         let (mut block, mut filtered) = (Block::EMPTY, Filtered::SILENT);
         for stretch in 0..self.stretches.len() {
             let point = self.point(p, stretch);
-            let mut gram: Gram<MANY> = Default::default();
+            let mut gram: Gram<L> = [[0.0; L]; L];
             let mut of_errors = OfErrors::NONE;
             let mut slow = None;
             filtered.begun = false;
             for rows in self.blocks_of(stretch) {
                 let count = rows.len();
                 fill(&self.signals, &point, rows.clone(), &mut block);
-                block.fill_sensors(&self.signals, &point, rows, &mut slow);
-                filter_many(&point, &block, count, &mut filtered);
-                add_many(&mut gram, &filtered.columns[..count]);
-                add_errors_many(&mut of_errors, &filtered, count);
+                if L == MANY {
+                    block.fill_sensors(&self.signals, &point, rows, &mut slow);
+                }
+                filter_block(&point, &block, count, &mut filtered);
+                add_products(&mut gram, &filtered.columns[..count]);
+                add_errors(&mut of_errors, &filtered, count);
             }
-            sums.add(stretch, &gram, COUNT, &of_errors);
+            sums.add(stretch, &gram, if L == MANY { COUNT } else { CORE }, &of_errors);
         }
-        self.with_prior_by_t_nms(p, sums.quadratic)
+        sums.quadratic
     }
 
     /// Every row at `p`, kept.
@@ -118,14 +92,14 @@ impl Problem<'_> {
             disturbance: Vec::with_capacity(rows),
             by_constant: (1.0 - p[RHO]) / (1.0 - p[THETA]),
         };
-        let (mut block, mut filtered) = (Block::EMPTY, Filtered::SILENT);
+        let (mut block, mut filtered) = (Block::EMPTY, Filtered::<FEW>::SILENT);
         for stretch in 0..self.stretches.len() {
             let point = self.point(p, stretch);
             filtered.begun = false;
             for rows in self.blocks_of(stretch) {
                 let count = rows.len();
                 fill(&self.signals, &point, rows, &mut block);
-                filter_few(&point, &block, count, &mut filtered);
+                filter_block(&point, &block, count, &mut filtered);
                 for [a, b, c, d, e, f, g, _] in &filtered.columns[..count] {
                     out.columns.push([*a, *b, *c, *d, *e, *f, *g]);
                 }

@@ -16,7 +16,7 @@ struct Course {
 }
 
 impl Course {
-    fn of(column: &Column<'_>) -> Result<Self, LogError> {
+    fn from_column(column: &Column<'_>) -> Result<Self, LogError> {
         let (group, series) = (column.group, column.series);
         let known = group
             .time_s
@@ -24,7 +24,7 @@ impl Course {
             .zip(&series.values)
             .filter(|(_, v)| !v.is_nan());
         let (time_s, values): (Vec<f64>, Vec<f64>) = known.map(|(t, v)| (*t, v * column.scale)).unzip();
-        let refuse = |what: String| Err(LogError::of(format_args!("channel {}", series.name), what));
+        let refuse = |what: String| Err(LogError::in_file(format_args!("channel {}", series.name), what));
         if let Some(w) = time_s.windows(2).find(|w| w[1].is_nan() || w[1] <= w[0]) {
             return refuse(format!("the time goes from {} to {} s: it must grow", w[0], w[1]));
         }
@@ -71,7 +71,7 @@ pub(super) fn at_the_torque(
 ) -> Result<(Vec<f64>, Values), LogError> {
     let mut courses: [Option<Course>; 6] = Default::default();
     for (course, column) in courses.iter_mut().zip(columns) {
-        *course = column.as_ref().map(Course::of).transpose()?;
+        *course = column.as_ref().map(Course::from_column).transpose()?;
     }
     let all = || courses.iter().flatten();
     let from = all().map(|c| c.time_s[0]).fold(f64::NEG_INFINITY, f64::max);

@@ -14,7 +14,7 @@ impl std::str::FromStr for Mapping {
     type Err = LogError;
 
     fn from_str(text: &str) -> Result<Self, LogError> {
-        let refuse = |what: String| LogError::of(format_args!("map {text}"), what);
+        let refuse = |what: String| LogError::in_file(format_args!("map {text}"), what);
         let Some((name, channel)) = text.split_once('=') else {
             return Err(refuse("NAME=CHANNEL or NAME=CHANNEL*SCALE is wanted".into()));
         };

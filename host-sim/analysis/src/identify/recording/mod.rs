@@ -43,8 +43,8 @@ pub fn open(
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
-    let bytes = std::fs::read(path).map_err(|e| LogError::of(path.display(), e))?;
-    of_bytes(bytes, Format::of(path).ok(), maps, how).map_err(|e| LogError::of(path.display(), e))
+    let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
+    of_bytes(bytes, Format::from_path(path).ok(), maps, how).map_err(|e| LogError::in_file(path.display(), e))
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.

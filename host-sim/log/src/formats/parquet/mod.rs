@@ -19,7 +19,7 @@ use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor, Type};
 use serde_json::{Value, json};
 
 use self::pages::Pages;
-use super::bytes::Room;
+use super::bytes::Budget;
 use crate::guard::guarded;
 use crate::recording::{Group, RecordingError, Series};
 
@@ -49,8 +49,12 @@ fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
         .and_then(|pair| serde_json::from_str(pair.value.as_deref()?).ok())
         .unwrap_or_default();
     let schema = metadata.file_metadata().schema_descr();
-    let kinds: Vec<Option<Kind>> = schema.columns().iter().map(|column| Kind::of(column)).collect();
-    let mut room = Room::of(&file);
+    let kinds: Vec<Option<Kind>> = schema
+        .columns()
+        .iter()
+        .map(|column| Kind::from_column(column))
+        .collect();
+    let mut budget = Budget::new(&file);
     let mut found = Vec::new();
     for (c, kind) in kinds.into_iter().enumerate() {
         let Some(kind) = kind else { continue };
@@ -58,8 +62,8 @@ fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
         let mut values = Vec::new();
         for group in metadata.row_groups() {
             let rows = usize::try_from(group.num_rows()).unwrap_or(0);
-            let read = Pages::of(&file, group.column(c), rows)
-                .and_then(|pages| append(schema.column(c), pages, kind, &mut values, &mut room));
+            let read = Pages::new(&file, group.column(c), rows)
+                .and_then(|pages| append(schema.column(c), pages, kind, &mut values, &mut budget));
             let read = read.map_err(|e| refuse(format!("channel {name}: {e}")))?;
             if read != rows {
                 return Err(refuse(format!(
@@ -95,7 +99,7 @@ struct Kind {
 
 impl Kind {
     /// None for what is no number.
-    fn of(column: &ColumnDescriptor) -> Option<Self> {
+    fn from_column(column: &ColumnDescriptor) -> Option<Self> {
         use ConvertedType as Old;
         if column.path().parts().len() != 1 || column.max_rep_level() > 0 || column.max_def_level() > 1 {
             return None;
@@ -140,13 +144,13 @@ fn append(
     pages: Pages,
     kind: Kind,
     out: &mut Vec<f64>,
-    room: &mut Room,
+    budget: &mut Budget,
 ) -> Result<usize, ParquetError> {
     fn all<T: DataType>(
         mut reader: ColumnReaderImpl<T>,
         has_gaps: bool,
         out: &mut Vec<f64>,
-        room: &mut Room,
+        budget: &mut Budget,
         number: impl Fn(&T::T) -> f64,
     ) -> Result<usize, ParquetError> {
         let before = out.len();
@@ -157,7 +161,8 @@ fn append(
                 return Ok(out.len() - before);
             }
             // A column of one value takes no room in a file.
-            room.take(rows)
+            budget
+                .take(rows)
                 .map_err(|e| ParquetError::General(e.to_string()))?;
             let mut there = values.iter().map(&number);
             if has_gaps {
@@ -170,17 +175,17 @@ fn append(
     }
     let has_gaps = column.max_def_level() > 0;
     match get_column_reader(column, Box::new(pages)) {
-        ColumnReader::BoolColumnReader(r) => all(r, has_gaps, out, room, |x| f64::from(u8::from(*x))),
+        ColumnReader::BoolColumnReader(r) => all(r, has_gaps, out, budget, |x| f64::from(u8::from(*x))),
         ColumnReader::Int32ColumnReader(r) if kind.is_unsigned => {
-            all(r, has_gaps, out, room, |x| f64::from(*x as u32))
+            all(r, has_gaps, out, budget, |x| f64::from(*x as u32))
         }
-        ColumnReader::Int32ColumnReader(r) => all(r, has_gaps, out, room, |x| f64::from(*x)),
+        ColumnReader::Int32ColumnReader(r) => all(r, has_gaps, out, budget, |x| f64::from(*x)),
         ColumnReader::Int64ColumnReader(r) if kind.is_unsigned => {
-            all(r, has_gaps, out, room, |x| *x as u64 as f64)
+            all(r, has_gaps, out, budget, |x| *x as u64 as f64)
         }
-        ColumnReader::Int64ColumnReader(r) => all(r, has_gaps, out, room, |x| *x as f64),
-        ColumnReader::FloatColumnReader(r) => all(r, has_gaps, out, room, |x| f64::from(*x)),
-        ColumnReader::DoubleColumnReader(r) => all(r, has_gaps, out, room, |x| *x),
+        ColumnReader::Int64ColumnReader(r) => all(r, has_gaps, out, budget, |x| *x as f64),
+        ColumnReader::FloatColumnReader(r) => all(r, has_gaps, out, budget, |x| f64::from(*x)),
+        ColumnReader::DoubleColumnReader(r) => all(r, has_gaps, out, budget, |x| *x),
         _ => Ok(0),
     }
 }

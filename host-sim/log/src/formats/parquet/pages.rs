@@ -35,7 +35,7 @@ fn refuse<T>(what: impl std::fmt::Display) -> Result<T> {
 impl Pages {
     /// # Errors
     /// A compression that is not read.
-    pub(super) fn of(file: &Bytes, column: &ColumnChunkMetaData, rows: usize) -> Result<Self> {
+    pub(super) fn new(file: &Bytes, column: &ColumnChunkMetaData, rows: usize) -> Result<Self> {
         let compression = column.compression();
         if let Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO = compression {
             let codec = column.compression_codec();
@@ -55,81 +55,46 @@ impl Pages {
         })
     }
 
-    fn unpacked(&mut self, page: Page) -> Result<Page> {
-        Ok(match page {
-            Page::DictionaryPage {
-                buf,
-                num_values,
-                encoding,
-                is_sorted,
-            } => {
-                let buf = unpack(self.compression, &buf)?;
+    fn unpacked(&mut self, mut page: Page) -> Result<Page> {
+        match &mut page {
+            Page::DictionaryPage { buf, num_values, .. } => {
+                *buf = unpack(self.compression, buf)?;
                 // A number takes four bytes at least.
-                if num_values as usize > buf.len() / 4 {
+                if *num_values as usize > buf.len() / 4 {
                     return refuse(format!(
                         "a dictionary of {} bytes has no {num_values} values",
                         buf.len()
                     ));
                 }
                 self.has_dictionary = true;
-                Page::DictionaryPage {
-                    buf,
-                    num_values,
-                    encoding,
-                    is_sorted,
-                }
             }
-            Page::DataPage {
+            Page::DataPage { buf, encoding, .. } => {
+                self.check(*encoding)?;
+                *buf = unpack(self.compression, buf)?;
+            }
+            Page::DataPageV2 {
                 buf,
                 num_values,
                 encoding,
-                def_level_encoding,
-                rep_level_encoding,
-                statistics,
-            } => {
-                self.check(encoding)?;
-                Page::DataPage {
-                    buf: unpack(self.compression, &buf)?,
-                    num_values,
-                    encoding,
-                    def_level_encoding,
-                    rep_level_encoding,
-                    statistics,
-                }
-            }
-            Page::DataPageV2 {
-                mut buf,
-                num_values,
-                encoding,
                 num_nulls,
-                num_rows,
                 def_levels_byte_len,
                 rep_levels_byte_len,
                 is_compressed,
-                statistics,
+                ..
             } => {
-                self.check(encoding)?;
-                let levels = def_levels_byte_len as usize + rep_levels_byte_len as usize;
+                self.check(*encoding)?;
+                let levels = *def_levels_byte_len as usize + *rep_levels_byte_len as usize;
                 if levels > buf.len() || num_nulls > num_values {
                     return refuse("the heading of a page is damaged");
                 }
-                if is_compressed {
+                if *is_compressed {
                     let values = unpack(self.compression, &buf[levels..])?;
-                    buf = [&buf[..levels], &values].concat().into();
-                }
-                Page::DataPageV2 {
-                    buf,
-                    num_values,
-                    encoding,
-                    num_nulls,
-                    num_rows,
-                    def_levels_byte_len,
-                    rep_levels_byte_len,
-                    is_compressed: false,
-                    statistics,
+                    *buf = [&buf[..levels], &values].concat().into();
+                    *is_compressed = false;
                 }
             }
-        })
+        }
+        Ok(page)
     }
 
     fn check(&self, encoding: Encoding) -> Result<()> {

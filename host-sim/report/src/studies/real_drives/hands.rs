@@ -41,16 +41,16 @@ fn curve(hands: &Hands) -> Figure {
         .chain([(0.0, 0.0)])
         .collect();
     Figure {
-        x: Axis::of("felt in shared driving", "%").within(0.0, 100.0),
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::of("felt by hand", "%").within(0.0, 102.0),
-            series: vec![
+        x: Axis::new("felt in shared driving", "%").within(0.0, 100.0),
+        panels: vec![Panel::new(
+            "",
+            Axis::new("felt by hand", "%").within(0.0, 102.0),
+            vec![
                 Series::line("no difference", 0, vec![(0.0, 0.0), (100.0, 100.0)]),
                 Series::line("by threshold", 1, all),
                 Series::dots("the ECU's threshold", 2, vec![point(hands.own().felt)]),
             ],
-        }],
+        )],
         ..Figure::default()
     }
 }
@@ -128,28 +128,22 @@ fn endings(hands: &Hands) -> Table {
 
 fn ends(hands: &Hands) -> Table {
     let row = |end: &End| {
-        vec![
-            Cell::text(&end.file),
-            Cell::text(if end.shared { "shared" } else { "by hand" }),
-            Cell::number(end.time_s, 1),
-            Cell::text(&end.faults),
-            Cell::number(end.driver_nm, 2),
-            Cell::number(end.guidance_nm, 2),
-            Cell::number(end.wheel_deg, 1),
+        [
+            ("Recording", Cell::text(&end.file)),
+            (
+                "Driving",
+                Cell::text(if end.shared { "shared" } else { "by hand" }),
+            ),
+            ("At, s", Cell::number(end.time_s, 1)),
+            ("Ended by", Cell::text(&end.faults)),
+            ("T_d, N.m", Cell::number(end.driver_nm, 2)),
+            ("T_h, N.m", Cell::number(end.guidance_nm, 2)),
+            ("Wheel, deg", Cell::number(end.wheel_deg, 1)),
         ]
     };
     let on_a_line = hands.feeds.iter().filter(|fed| fed.feed == Feed::Line);
-    Table::new(
+    Table::of_rows(
         "Each end with values on a line: the mean torques of the second before it, and how far the wheel turned in it.",
-        [
-            "Recording",
-            "Driving",
-            "At, s",
-            "Ended by",
-            "T_d, N.m",
-            "T_h, N.m",
-            "Wheel, deg",
-        ],
         on_a_line.flat_map(|fed| &fed.ends).map(row),
     )
 }

@@ -20,12 +20,12 @@ pub(super) fn distribution(summary: &Summary) -> Named {
         x,
     });
     let figure = Figure {
-        x: Axis::of(&name, unit),
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::of("Share of the drives", "-").within(0.0, 1.0),
-            series: vec![Series::line("", 0, points)],
-        }],
+        x: Axis::new(&name, unit),
+        panels: vec![Panel::new(
+            "",
+            Axis::new("Share of the drives", "-").within(0.0, 1.0),
+            vec![Series::line("", 0, points)],
+        )],
         markers: markers.into_iter().collect(),
         ..Figure::default()
     };
@@ -90,11 +90,11 @@ pub(super) fn influence(summary: &Summary) -> Option<Named> {
         format!("Sobol indices of {judge} with their standard errors.")
     };
     let figure = Figure {
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::of("Share of the variance", "-").within(-0.03, 1.03),
+        panels: vec![Panel::new(
+            "",
+            Axis::new("Share of the variance", "-").within(-0.03, 1.03),
             series,
-        }],
+        )],
         rows,
         ..Figure::default()
     };
@@ -134,22 +134,22 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
         (1..=effect.levels.len()).map(|i| i as f64).collect()
     };
     let (name, unit) = metric(summary.judge);
-    let mut panels = vec![Panel {
-        title: String::new(),
-        y: Axis::of(&format!("Mean {}", lower(&name)), unit),
-        series: series(summary, effect, &places, numbers, |drives| {
+    let mut panels = vec![Panel::new(
+        "",
+        Axis::new(&format!("Mean {}", lower(&name)), unit),
+        series(summary, effect, &places, numbers, |drives| {
             (drives.mean, drives.interval)
         }),
-    }];
+    )];
     if summary.limit.is_some() {
-        panels.push(Panel {
-            title: String::new(),
-            y: Axis::of("Bad drives", "%"),
-            series: series(summary, effect, &places, numbers, |drives| {
+        panels.push(Panel::new(
+            "",
+            Axis::new("Bad drives", "%"),
+            series(summary, effect, &places, numbers, |drives| {
                 let ends = drives.beyond_interval.map(|ends| ends.map(|share| 100.0 * share));
                 (drives.beyond.map(|share| 100.0 * share), ends)
             }),
-        });
+        ));
     }
     let diverged = effect
         .levels
@@ -161,7 +161,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
         x: *x,
     });
     Figure {
-        x: Axis::of(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
+        x: Axis::new(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
         rows: if numbers {
             Vec::new()
         } else {

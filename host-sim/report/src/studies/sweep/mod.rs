@@ -8,7 +8,7 @@ use crate::document::{Block, Cell, Provenance, Report, Section, Table, definitio
 use figures::{distribution, influence, responses};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::Away;
-use haptic_batch::sweep::{Driven, Point, Summary, Sweep};
+use haptic_batch::sweep::{DesignPoint, Driven, Summary, Sweep};
 
 use tables::{short_tables, tables};
 
@@ -42,7 +42,7 @@ pub fn report(sweep: &Sweep, summary: &Summary, file: &str) -> Report {
         title: "Sweep".into(),
         summary: headline(sweep, summary),
         sections,
-        provenance: Provenance::of(Some(sweep.text().into())),
+        provenance: Provenance::new(Some(sweep.text().into())),
         ..Report::default()
     }
 }
@@ -114,7 +114,7 @@ pub fn plan(sweep: &Sweep) -> Report {
     }
 }
 
-fn values(point: &Point) -> impl Iterator<Item = String> {
+fn values(point: &DesignPoint) -> impl Iterator<Item = String> {
     point
         .values
         .iter()
@@ -122,7 +122,7 @@ fn values(point: &Point) -> impl Iterator<Item = String> {
 }
 
 /// One drive: what is varied, and what came of it.
-pub fn drive_table(sweep: &Sweep, point: &Point, driven: &Driven) -> Table {
+pub fn drive_table(sweep: &Sweep, point: &DesignPoint, driven: &Driven) -> Table {
     let varied = sweep.columns().map(String::from).zip(values(point));
     let metric = |(definition, value): (&&Definition, &Option<f64>)| {
         (

@@ -1,10 +1,10 @@
 //! The centreline as a curve to project onto.
 //!
-//! The course is cut into cells, each with its exact position, heading and curvature at its middle. Inside a
-//! cell the clothoid is its Taylor expansion about the middle, so a projection needs no trigonometry: cells
-//! are short enough (`MAX_CELL_M`, `MAX_CELL_TURN_RAD`) that the terms left out stay below 1e-9 m. The foot
-//! of the perpendicular is found by Newton's method, starting from where the same point was last seen: a
-//! `Tracker` walks forward with its point, so a course may cross itself.
+//! The course is divided into cells; each stores the exact position, heading and curvature at its middle. Inside a
+//! cell the clothoid is replaced by its Taylor expansion about the middle, so a projection needs no trigonometry.
+//! Cells are so short (`MAX_CELL_M`, `MAX_CELL_TURN_RAD`) that the neglected terms stay below 1e-9 m. The foot of the
+//! perpendicular from a point is found by Newton's method, starting at the foot that the same point had in the step
+//! before. A `Tracker` holds that start and moves along with its point, so a course may cross itself.
 
 use super::piece::{Piece, Pose, Surface};
 use super::{Course, Segment};
@@ -24,8 +24,9 @@ const MAX_NEWTON_STEPS: usize = 20;
 pub const MIN_DETERMINANT: f64 = 0.1;
 /// How far beyond its ends the centreline is continued, m: enough for the step that finds the end.
 pub const OVERRUN_M: f64 = 2.0;
-/// A lane of a file may have kinks, where a perpendicular has no foot on one side and two on the other: the search
-/// goes to and fro across the kink in steps of this length at most, m, and the kink itself is the answer.
+/// The centre of a lane from a file may have kinks. There a point has no foot on one side and two on the other, and
+/// the search jumps to and fro across the kink. Its steps are then limited to this length, m, and the kink is taken
+/// as the foot.
 const KINK_M: f64 = 0.5;
 
 /// A piece of the centreline, expanded about its middle.
@@ -38,7 +39,6 @@ pub struct Cell {
     /// Position of the middle, m.
     pub x_m: f64,
     /// See `x_m`.
-    /// See `x_m`.
     pub y_m: f64,
     /// Unit tangent.
     pub tangent: [f64; 2],
@@ -48,7 +48,7 @@ pub struct Cell {
     pub curvature_1pm: f64,
     /// Change of curvature with arc length, 1/m^2.
     pub curvature_slope_1pm2: f64,
-    /// Square of the curvature over six, and its third power: a division less in each projection.
+    /// A sixth of the curvature's square, and its third power, which each projection needs.
     pub curvature_powers: [f64; 2],
 }
 
@@ -431,7 +431,7 @@ mod tests {
     #[test]
     fn a_circle_is_a_circle() {
         let radius = 50.0;
-        let line = centreline("[[segment]]\nlength = 300\ncurvature = 0.02");
+        let line = centreline("[[segment]]\nlength_m = 300\ncurvature_per_m = 0.02");
         for (s, offset) in [(0.0, 0.0), (10.0, 3.0), (77.7, -4.0), (299.0, 0.5), (150.0, 20.0)] {
             let angle: f64 = s / radius;
             let (x, y) = (
@@ -453,8 +453,8 @@ mod tests {
         let a = 100.0;
         let end_curvature = std::f64::consts::PI / a;
         let line = centreline(&format!(
-            "[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = {end_curvature}\n\
-             [[segment]]\nlength = 10"
+            "[[segment]]\nlength_m = 100\ncurvature_start_per_m = 0\ncurvature_end_per_m = {end_curvature}\n\
+             [[segment]]\nlength_m = 10"
         ));
         let found = foot(&line, a * c1, a * s1, 99.0).unwrap();
         assert!((found.s_m - 100.0).abs() < 1e-8, "{found:?}");
@@ -470,8 +470,8 @@ mod tests {
     #[test]
     fn a_point_beside_any_clothoid_projects_back() {
         let line = centreline(
-            "[[segment]]\nlength = 8\ncurvature_start = -0.1\ncurvature_end = 0.1\n\
-             [[segment]]\nlength = 12\ncurvature = 0.1",
+            "[[segment]]\nlength_m = 8\ncurvature_start_per_m = -0.1\ncurvature_end_per_m = 0.1\n\
+             [[segment]]\nlength_m = 12\ncurvature_per_m = 0.1",
         );
         let curvature = |s: f64| if s < 8.0 { -0.1 + 0.2 * s / 8.0 } else { 0.1 };
         let ds = 1e-5;
@@ -496,10 +496,10 @@ mod tests {
 
     #[test]
     fn a_point_without_a_foot_is_refused() {
-        let line = centreline("[[segment]]\nlength = 30\ncurvature = 0.1");
+        let line = centreline("[[segment]]\nlength_m = 30\ncurvature_per_m = 0.1");
         // The centre of the circle is (0, 10): every point of the arc is equally near.
         assert_eq!(foot(&line, 0.0, 10.0, 5.0), None);
-        let straight = centreline("[[segment]]\nlength = 30");
+        let straight = centreline("[[segment]]\nlength_m = 30");
         assert_eq!(foot(&straight, 33.0, 0.0, 29.0), None, "3 m beyond the end");
         assert_eq!(foot(&straight, -3.0, 0.0, 1.0), None, "3 m before the start");
         assert_eq!(foot(&straight, f64::NAN, 0.0, 1.0), None);

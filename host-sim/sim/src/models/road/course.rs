@@ -1,18 +1,19 @@
 //! A course as a person writes it: segments of linearly varying curvature, bank and grade, and a lane width; or
 //! a lane of an OpenDRIVE file.
 //!
-//! As TOML: `lane_width = 3.6` (m) and `[[segment]]` tables with `length` (m) and either `curvature` (1/m,
-//! left positive, default 0) or both `curvature_start` and `curvature_end`; in the same way `bank` (rad, positive
-//! where the left edge is the higher one) and `grade` (rise per distance). All may jump between segments (an arc
-//! without a clothoid); heading never does.
+//! As TOML: `lane_width_m` and `[[segment]]` tables of the fields in [`SEGMENT_FIELDS`]: `length_m` and either `curvature_per_m`
+//! (default 0) or both `curvature_start_per_m` and `curvature_end_per_m`; in the same way `bank_rad` and `grade`. All may jump between
+//! segments (an arc without a clothoid); heading never does.
 
 use std::sync::{Arc, LazyLock, OnceLock};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::Centreline;
 use super::opendrive::{self, LaneChoice, RoadUsed};
 use super::piece::Piece;
+use crate::fields::Field;
+use crate::fields::Range::Between;
 use crate::input::{InputError, RangeError, in_range, parse_toml};
 
 /// Name under which the built-in course is asked for.
@@ -25,14 +26,63 @@ const MIN_SEGMENT_M: f64 = 0.01;
 pub(super) const MAX_COURSE_M: f64 = 200_000.0;
 /// Most that a course may turn in all, rad, to and fro: keeps the table below 200 MB in curves.
 const MAX_TURN_RAD: f64 = 5000.0;
-/// Lane widths of roads, m. The lower end clears the vehicle's 1.7 m.
-const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=10.0;
 /// Width of a lane unless a course has its own, m: the paper's.
 pub const DEFAULT_LANE_WIDTH_M: f64 = 3.6;
-/// Banks of a course file, rad: far beyond the 8 % of public roads.
-const BANK_RAD: std::ops::RangeInclusive<f64> = -0.3..=0.3;
-/// Grades of a course file.
-const GRADE: std::ops::RangeInclusive<f64> = -0.3..=0.3;
+/// The fields of a course file beside its segments.
+pub const COURSE_FIELDS: &[Field] = &[Field {
+    name: "lane_width_m",
+    symbol: "",
+    unit: "m",
+    // The lower end clears the vehicle's 1.7 m.
+    range: Between(2.0, 10.0),
+    default: Some(DEFAULT_LANE_WIDTH_M),
+    meaning: "of the lane whose middle is the centreline",
+}];
+
+/// The fields of a segment of a course file. Curvature, bank and grade are given for all of it, or at its start and its end.
+pub const SEGMENT_FIELDS: &[Field] = &[
+    segment_field("length_m", "m", [MIN_SEGMENT_M, MAX_COURSE_M], None, "arc length"),
+    curvature("curvature_per_m", Some(0.0), "left positive"),
+    curvature("curvature_start_per_m", None, "at the start of a clothoid"),
+    curvature("curvature_end_per_m", None, "at its end"),
+    bank("bank_rad", Some(0.0), "positive: the left edge is the higher one"),
+    bank("bank_start_rad", None, "at the start of a change"),
+    bank("bank_end_rad", None, "at its end"),
+    grade("grade", Some(0.0), "rise per distance, positive uphill"),
+    grade("grade_start", None, "at the start of a change"),
+    grade("grade_end", None, "at its end"),
+];
+
+const fn segment_field(
+    name: &'static str,
+    unit: &'static str,
+    [from, to]: [f64; 2],
+    default: Option<f64>,
+    meaning: &'static str,
+) -> Field {
+    Field {
+        name,
+        symbol: "",
+        unit,
+        range: Between(from, to),
+        default,
+        meaning,
+    }
+}
+
+const fn curvature(name: &'static str, default: Option<f64>, meaning: &'static str) -> Field {
+    let range = [-MAX_CURVATURE_1PM, MAX_CURVATURE_1PM];
+    segment_field(name, "1/m", range, default, meaning)
+}
+
+/// Far beyond the 8 % of public roads.
+const fn bank(name: &'static str, default: Option<f64>, meaning: &'static str) -> Field {
+    segment_field(name, "rad", [-0.3, 0.3], default, meaning)
+}
+
+const fn grade(name: &'static str, default: Option<f64>, meaning: &'static str) -> Field {
+    segment_field(name, "", [-0.3, 0.3], default, meaning)
+}
 
 /// A part of a road whose curvature, bank and grade are linear in arc length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,32 +134,33 @@ pub enum CourseError {
     #[error("a course needs at least one [[segment]]")]
     Empty,
     /// A quantity that is given for all of a segment and for an end of it.
-    #[error("give either `{0}` or `{0}_start` and `{0}_end`, not both")]
-    Both(&'static str),
+    #[error("give either `{whole}` or `{start}` and `{end}`, not both", whole = .0[0], start = .0[1], end = .0[2])]
+    Both([&'static str; 3]),
     /// A quantity that is given for one end of a segment alone.
-    #[error("`{0}_start` and `{0}_end` go together")]
-    OneEnd(&'static str),
+    #[error("`{start}` and `{end}` go together", start = .0[1], end = .0[2])]
+    OneEnd([&'static str; 3]),
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CourseFile {
     #[serde(default = "default_lane_width")]
-    lane_width: f64,
+    lane_width_m: f64,
     #[serde(default)]
     segment: Vec<SegmentFile>,
 }
 
-#[derive(Deserialize)]
+/// A segment as a person writes it, in a course file or in a scenario.
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct SegmentFile {
-    length: f64,
-    curvature: Option<f64>,
-    curvature_start: Option<f64>,
-    curvature_end: Option<f64>,
-    bank: Option<f64>,
-    bank_start: Option<f64>,
-    bank_end: Option<f64>,
+pub(crate) struct SegmentFile {
+    length_m: f64,
+    curvature_per_m: Option<f64>,
+    curvature_start_per_m: Option<f64>,
+    curvature_end_per_m: Option<f64>,
+    bank_rad: Option<f64>,
+    bank_start_rad: Option<f64>,
+    bank_end_rad: Option<f64>,
     grade: Option<f64>,
     grade_start: Option<f64>,
     grade_end: Option<f64>,
@@ -183,7 +234,7 @@ impl Course {
         lane_width_m: f64,
         segments: Vec<Segment>,
     ) -> Result<Self, CourseError> {
-        in_range("lane_width", lane_width_m, LANE_WIDTH_M, "m")?;
+        COURSE_FIELDS[0].check(lane_width_m)?;
         if segments.is_empty() {
             return Err(CourseError::Empty);
         }
@@ -237,12 +288,20 @@ impl Course {
     /// and range).
     pub fn from_toml(name: &str, text: &str) -> Result<Self, InputError> {
         let file: CourseFile = parse_toml(name, text)?;
-        let segments = file.segment.iter().enumerate().map(|(i, segment)| {
+        Self::of_file(name, file.lane_width_m, &file.segment)
+    }
+
+    pub(crate) fn of_file(
+        name: &str,
+        lane_width_m: f64,
+        segments: &[SegmentFile],
+    ) -> Result<Self, InputError> {
+        let segments = segments.iter().enumerate().map(|(i, segment)| {
             let parsed = segment.parsed();
             parsed.map_err(|e| CourseError::Segment(i + 1, Box::new(e)))
         });
         let course = segments.collect::<Result<_, _>>();
-        let course = course.and_then(|segments| Self::new(name, file.lane_width, segments));
+        let course = course.and_then(|segments| Self::new(name, lane_width_m, segments));
         course.map_err(|e| InputError::new(name, e))
     }
 
@@ -338,47 +397,61 @@ impl Segment {
     }
 
     fn check(&self) -> Result<(), RangeError> {
-        in_range("length", self.length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
+        let [length, varying @ ..] = SEGMENT_FIELDS else {
+            return Ok(());
+        };
+        length.check(self.length_m)?;
         let curvature = [self.curvature_start_1pm, self.curvature_end_1pm];
-        let curvature_range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
-        for (quantity, [start, end], range, unit) in [
-            ("curvature", curvature, curvature_range, "1/m"),
-            ("bank", self.bank_rad, BANK_RAD, "rad"),
-            ("grade", self.grade, GRADE, ""),
-        ] {
-            let constant = start.to_bits() == end.to_bits();
-            let name = |end: &str| {
-                if constant {
-                    quantity.into()
-                } else {
-                    format!("{quantity}_{end}")
-                }
-            };
-            in_range(&name("start"), start, range.clone(), unit)?;
-            in_range(&name("end"), end, range, unit)?;
+        for (fields, [start, end]) in varying
+            .chunks_exact(3)
+            .zip([curvature, self.bank_rad, self.grade])
+        {
+            let is_constant = start.to_bits() == end.to_bits();
+            fields[usize::from(!is_constant)].check(start)?;
+            fields[2].check(end)?;
         }
         Ok(())
     }
 }
 
-impl SegmentFile {
-    fn parsed(&self) -> Result<Segment, CourseError> {
-        let curvature = [self.curvature, self.curvature_start, self.curvature_end];
-        let bank = [self.bank, self.bank_start, self.bank_end];
-        let grade = [self.grade, self.grade_start, self.grade_end];
-        let [start, end] = ends("curvature", curvature)?;
-        let segment = Segment::clothoid(self.length, start, end);
-        Ok(segment.with_surface(ends("bank", bank)?, ends("grade", grade)?))
+impl From<&Segment> for SegmentFile {
+    fn from(segment: &Segment) -> Self {
+        Self {
+            length_m: segment.length_m,
+            curvature_start_per_m: Some(segment.curvature_start_1pm),
+            curvature_end_per_m: Some(segment.curvature_end_1pm),
+            bank_start_rad: Some(segment.bank_rad[0]),
+            bank_end_rad: Some(segment.bank_rad[1]),
+            grade_start: Some(segment.grade[0]),
+            grade_end: Some(segment.grade[1]),
+            ..Self::default()
+        }
     }
 }
 
-/// A quantity of a segment: `NAME` for all of it, or `NAME_start` and `NAME_end`.
-fn ends(name: &'static str, given: [Option<f64>; 3]) -> Result<[f64; 2], CourseError> {
+impl SegmentFile {
+    fn parsed(&self) -> Result<Segment, CourseError> {
+        let curvature = [
+            self.curvature_per_m,
+            self.curvature_start_per_m,
+            self.curvature_end_per_m,
+        ];
+        let bank = [self.bank_rad, self.bank_start_rad, self.bank_end_rad];
+        let grade = [self.grade, self.grade_start, self.grade_end];
+        let [start, end] = ends(1, curvature)?;
+        let segment = Segment::clothoid(self.length_m, start, end);
+        Ok(segment.with_surface(ends(4, bank)?, ends(7, grade)?))
+    }
+}
+
+/// A quantity of a segment: for all of it, or at its start and its end. `first` is its place in [`SEGMENT_FIELDS`].
+fn ends(first: usize, given: [Option<f64>; 3]) -> Result<[f64; 2], CourseError> {
+    let names = [0, 1, 2].map(|i| SEGMENT_FIELDS[first + i].name);
     match given {
         [constant, None, None] => Ok([constant.unwrap_or(0.0); 2]),
         [None, Some(start), Some(end)] => Ok([start, end]),
-        [Some(_), ..] => Err(CourseError::Both(name)),
-        [None, ..] => Err(CourseError::OneEnd(name)),
+        [Some(_), ..] => Err(CourseError::Both(names)),
+        [None, ..] => Err(CourseError::OneEnd(names)),
     }
 }
 
@@ -400,8 +473,8 @@ mod tests {
 
     #[test]
     fn a_file_gives_straights_arcs_and_clothoids() {
-        let text = "lane_width = 3\n[[segment]]\nlength = 10\n[[segment]]\nlength = 5.5\ncurvature = -0.01\n\
-                    [[segment]]\nlength = 7\ncurvature_start = -0.01\ncurvature_end = 0.02\n";
+        let text = "lane_width_m = 3\n[[segment]]\nlength_m = 10\n[[segment]]\nlength_m = 5.5\ncurvature_per_m = -0.01\n\
+                    [[segment]]\nlength_m = 7\ncurvature_start_per_m = -0.01\ncurvature_end_per_m = 0.02\n";
         let course = Course::from_toml("t.toml", text).unwrap();
         assert_eq!(course.lane_width_m(), 3.0);
         let values: Vec<_> = course
@@ -418,44 +491,50 @@ mod tests {
     #[test]
     fn every_bad_course_is_refused_by_file_field_value_and_range() {
         let cases = [
-            ("lane_width = 3.6", "at least one [[segment]]"),
+            ("lane_width_m = 3.6", "at least one [[segment]]"),
             (
-                "[[segment]]\nlength = 0",
-                "segment 1: length = 0 m is outside 0.01 to 200000 m",
+                "[[segment]]\nlength_m = 0",
+                "segment 1: length_m = 0 m is outside 0.01 to 200000 m",
             ),
-            ("[[segment]]\nlength = -3", "length = -3 m"),
-            ("[[segment]]\nlength = nan", "length = NaN m"),
-            ("[[segment]]\nlength = inf", "length = inf m"),
+            ("[[segment]]\nlength_m = -3", "length_m = -3 m"),
+            ("[[segment]]\nlength_m = nan", "length_m = NaN m"),
+            ("[[segment]]\nlength_m = inf", "length_m = inf m"),
             (
-                "[[segment]]\nlength = 9\ncurvature = 0.2",
-                "curvature = 0.2 1/m is outside -0.1 to 0.1 1/m",
-            ),
-            ("[[segment]]\nlength = 9\ncurvature = nan", "curvature = NaN"),
-            (
-                "[[segment]]\nlength = 9\ncurvature_start = 0.2\ncurvature_end = 0",
-                "curvature_start = 0.2",
+                "[[segment]]\nlength_m = 9\ncurvature_per_m = 0.2",
+                "curvature_per_m = 0.2 1/m is outside -0.1 to 0.1 1/m",
             ),
             (
-                "[[segment]]\nlength = 9\ncurvature_start = 0.0\ncurvature_end = -1",
-                "curvature_end = -1",
+                "[[segment]]\nlength_m = 9\ncurvature_per_m = nan",
+                "curvature_per_m = NaN",
             ),
-            ("[[segment]]\nlength = 9\ncurvature_start = 0.0", "go together"),
             (
-                "[[segment]]\nlength = 9\ncurvature = 0\ncurvature_end = 0",
+                "[[segment]]\nlength_m = 9\ncurvature_start_per_m = 0.2\ncurvature_end_per_m = 0",
+                "curvature_start_per_m = 0.2",
+            ),
+            (
+                "[[segment]]\nlength_m = 9\ncurvature_start_per_m = 0.0\ncurvature_end_per_m = -1",
+                "curvature_end_per_m = -1",
+            ),
+            (
+                "[[segment]]\nlength_m = 9\ncurvature_start_per_m = 0.0",
+                "go together",
+            ),
+            (
+                "[[segment]]\nlength_m = 9\ncurvature_per_m = 0\ncurvature_end_per_m = 0",
                 "not both",
             ),
             (
-                "lane_width = 0.5\n[[segment]]\nlength = 9",
-                "lane_width = 0.5 m is outside 2 to 10 m",
+                "lane_width_m = 0.5\n[[segment]]\nlength_m = 9",
+                "lane_width_m = 0.5 m is outside 2 to 10 m",
             ),
-            ("[[segment]]\nlength = 9\nradius = 3", "radius"),
-            ("lanes = 2\n[[segment]]\nlength = 9", "lanes"),
-            ("[[segment]]\ncurvature = 0", "length"),
-            ("[[segment]]\nlength = \"long\"", "line 2"),
-            ("[[segment]]\nlength = \"long\"", "expected a number"),
-            ("[[segment]\nlength = 9", "line 1"),
+            ("[[segment]]\nlength_m = 9\nradius = 3", "radius"),
+            ("lanes = 2\n[[segment]]\nlength_m = 9", "lanes"),
+            ("[[segment]]\ncurvature_per_m = 0", "length_m"),
+            ("[[segment]]\nlength_m = \"long\"", "line 2"),
+            ("[[segment]]\nlength_m = \"long\"", "expected a number"),
+            ("[[segment]\nlength_m = 9", "line 1"),
             (
-                "[[segment]]\nlength = 150000\n[[segment]]\nlength = 150000",
+                "[[segment]]\nlength_m = 150000\n[[segment]]\nlength_m = 150000",
                 "course length = 300000 m",
             ),
         ];

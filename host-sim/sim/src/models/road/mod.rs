@@ -11,6 +11,8 @@ mod piece;
 
 pub use centreline::{CONVERGED_M, Cell, MIN_DETERMINANT, OVERRUN_M};
 pub use centreline::{Centreline, Projection, Tracker};
-pub use course::{Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE, Segment};
+pub(crate) use course::SegmentFile;
+pub use course::{COURSE_FIELDS, Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE};
+pub use course::{SEGMENT_FIELDS, Segment};
 pub use opendrive::{LaneChoice, RoadUsed};
 pub use piece::{Pose, Surface};

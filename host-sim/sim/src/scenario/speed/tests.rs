@@ -195,7 +195,7 @@ fn a_speed_written_and_read_again_is_the_same() {
 
 #[test]
 fn a_road_too_short_for_its_first_second_says_what_it_needs() {
-    let course = Course::from_toml("c", "[[segment]]\nlength = 44").unwrap();
+    let course = Course::from_toml("c", "[[segment]]\nlength_m = 44").unwrap();
     let scenario = Scenario::builder().course(course);
     // 20 m/s, 3 m/s2: 21.5 m in the first second, and then 23 m ahead.
     let error = scenario

@@ -92,7 +92,7 @@ impl Layout {
     /// # Errors
     /// No such name or file; a file that is no layout.
     pub fn named(name: &str) -> Result<Self, LogError> {
-        let refused = |why: &dyn fmt::Display| LogError::of(format_args!("layout {name}"), why);
+        let refused = |why: &dyn fmt::Display| LogError::in_file(format_args!("layout {name}"), why);
         let built_in = BUILT_IN.iter().find(|(known, _)| *known == name);
         let text = match built_in {
             Some((_, text)) => (*text).to_owned(),

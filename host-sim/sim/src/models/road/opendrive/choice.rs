@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::error::{RoadError, refuse};
-use super::network::{Leg, Network, Next, listed};
+use super::network::{Network, Next, Passage, listed};
 use super::road::{Lane, Road};
 use crate::input::InputError;
 
@@ -48,7 +48,7 @@ impl LaneChoice {
     }
 }
 
-/// The first leg and its lane.
+/// The first passage and its lane.
 ///
 /// # Errors
 /// A road or lane that is not there, or a file that leaves the choice open.
@@ -56,7 +56,7 @@ pub(super) fn start(
     network: &Network,
     choice: &LaneChoice,
     notes: &mut Vec<String>,
-) -> Result<(Leg, i32), RoadError> {
+) -> Result<(Passage, i32), RoadError> {
     if choice.lane == Some(0) {
         return refuse("lane 0 is the centre lane, which has no width");
     }
@@ -68,14 +68,14 @@ pub(super) fn start(
         None => chain_ends(network)?,
     };
     let mut refusals = Vec::new();
-    for leg in candidates {
-        match lane_on(network, leg, choice.lane) {
+    for passage in candidates {
+        match lane_on(network, passage, choice.lane) {
             Ok(lane) => {
                 if choice.road.is_none() || choice.lane.is_none() {
-                    let road = network.roads[leg.0].id;
+                    let road = network.roads[passage.0].id;
                     notes.push(format!("the course begins on road {road} in lane {lane}"));
                 }
-                return Ok((leg, lane));
+                return Ok((passage, lane));
             }
             Err(refusal) => refusals.push(refusal),
         }
@@ -84,34 +84,37 @@ pub(super) fn start(
     Err(refusals.swap_remove(0))
 }
 
-/// The legs from which all roads of the file can be driven in one go, those along the road's s first.
-fn chain_ends(network: &Network) -> Result<Vec<Leg>, RoadError> {
-    let legs = [true, false].map(|along| (0..network.roads.len()).map(move |index| (index, along)));
-    let legs: Vec<Leg> = legs.into_iter().flatten().collect();
+/// The passages from which all roads of the file can be driven in one go, those along the road's s first.
+fn chain_ends(network: &Network) -> Result<Vec<Passage>, RoadError> {
+    let passages = [true, false].map(|along| (0..network.roads.len()).map(move |index| (index, along)));
+    let passages: Vec<Passage> = passages.into_iter().flatten().collect();
     let mut followers = HashSet::new();
-    for leg in &legs {
-        if let Next::Road(next) | Next::Connection(next, _) = network.next(*leg, None)? {
+    for passage in &passages {
+        if let Next::Road(next) | Next::Connection(next, _) = network.next(*passage, None)? {
             followers.insert(next);
         }
     }
     // A chain begins where nothing leads to; a ring begins with the first road of the file, either way.
-    let mut ends: Vec<Leg> = legs.into_iter().filter(|leg| !followers.contains(leg)).collect();
+    let mut ends: Vec<Passage> = passages
+        .into_iter()
+        .filter(|passage| !followers.contains(passage))
+        .collect();
     ends.extend([(0, true), (0, false)]);
     let mut whole = Vec::new();
     for end in ends {
-        let (legs, _) = network.chain(end)?;
-        if legs.len() == network.roads.len() && !whole.contains(&end) {
+        let (passages, _) = network.chain(end)?;
+        if passages.len() == network.roads.len() && !whole.contains(&end) {
             whole.push(end);
         }
     }
     if whole.is_empty() {
-        let (legs, stuck) = network.chain((0, true))?;
-        return refuse(not_one_chain(network, &legs, stuck));
+        let (passages, stuck) = network.chain((0, true))?;
+        return refuse(not_one_chain(network, &passages, stuck));
     }
     Ok(whole)
 }
 
-fn not_one_chain(network: &Network, chain: &[Leg], stuck: Option<Next>) -> String {
+fn not_one_chain(network: &Network, chain: &[Passage], stuck: Option<Next>) -> String {
     let list = |ids: Vec<&str>| {
         let more = if ids.len() > 12 { ", ..." } else { "" };
         format!("{}{more}", ids[..ids.len().min(12)].join(", "))
@@ -147,8 +150,8 @@ fn not_one_chain(network: &Network, chain: &[Leg], stuck: Option<Next>) -> Strin
     )
 }
 
-/// The lane to begin in on a leg: the one asked for, if it is driven in that direction, or the rightmost.
-fn lane_on(network: &Network, (index, along): Leg, lane: Option<i32>) -> Result<i32, RoadError> {
+/// The lane to begin in on a passage: the one asked for, if it is driven in that direction, or the rightmost.
+fn lane_on(network: &Network, (index, along): Passage, lane: Option<i32>) -> Result<i32, RoadError> {
     let node = &network.roads[index];
     let road = Road::read(node.id, node.node)?;
     // The side that is driven along s.

@@ -6,7 +6,7 @@
 use roxmltree::Node;
 
 use super::error::{RoadError, refuse};
-use super::polynomial::{Point, Polynomial};
+use super::polynomial::{CurvePoint, Polynomial};
 use super::xml::{cubic, number, text};
 use crate::models::road::centreline::quadrature;
 use crate::models::road::course::MAX_COURSE_M;
@@ -216,7 +216,7 @@ fn along(curvature: f64, slope: f64, length_m: f64) -> Pose {
 
 impl Geometry {
     /// The point at an s of the road. Meant for s of this element; beyond it the curve is continued.
-    pub(super) fn at(&self, s_m: f64) -> Point {
+    pub(super) fn at(&self, s_m: f64) -> CurvePoint {
         let ds = s_m - self.start_m;
         match &self.kind {
             Kind::Clothoid {
@@ -228,7 +228,7 @@ impl Geometry {
                 let index = ((ds / step_m).max(0.0) as usize).min(table.len() - 2);
                 let from = index as f64 * step_m;
                 let local = table[index].of_local(along(start + slope * from, slope, ds - from));
-                Point {
+                CurvePoint {
                     pose: self.start.of_local(local),
                     curvature_1pm: start + slope * ds,
                     curvature_slope_1pm2: slope,

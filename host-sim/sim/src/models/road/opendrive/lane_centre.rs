@@ -54,7 +54,7 @@ struct Interval<'r> {
 }
 
 /// A point of the lane's centre.
-struct Point {
+struct CentrePoint {
     pose: Pose,
     curvature_1pm: f64,
     /// Its arc length per s.
@@ -85,11 +85,11 @@ pub(super) fn stretch(road: &Road, section: &Section, id: i32) -> Result<Stretch
             road,
             geometry: &road.line[index],
             sign: f64::from(sign),
-            lane_offset: road.lane_offset.of(middle_m),
-            inner: inner.iter().map(|profile| profile.of(middle_m)).collect(),
-            own: own.of(middle_m),
-            superelevation: road.superelevation.of(middle_m),
-            elevation: road.elevation.of(middle_m),
+            lane_offset: road.lane_offset.piece_at(middle_m),
+            inner: inner.iter().map(|profile| profile.piece_at(middle_m)).collect(),
+            own: own.piece_at(middle_m),
+            superelevation: road.superelevation.piece_at(middle_m),
+            elevation: road.elevation.piece_at(middle_m),
             is_level,
             middle_m,
         };
@@ -149,7 +149,7 @@ fn breakpoints<'p>(
 }
 
 impl Interval<'_> {
-    fn at(&self, s_m: f64) -> Result<Point, RoadError> {
+    fn at(&self, s_m: f64) -> Result<CentrePoint, RoadError> {
         let reference = self.geometry.at(s_m);
         let own = self.own.at(s_m);
         let mut t = self.lane_offset.at(s_m);
@@ -190,7 +190,7 @@ impl Interval<'_> {
         } else {
             roll + self.road.cross_slope(s_m, self.middle_m, t[0])
         };
-        Ok(Point {
+        Ok(CentrePoint {
             pose: Pose {
                 x_m: reference.pose.x_m - plan * heading_sin,
                 y_m: reference.pose.y_m + plan * heading_cos,
@@ -205,7 +205,7 @@ impl Interval<'_> {
     }
 
     /// Adds the pieces from one place to another; returns the points there.
-    fn cut(&self, from_m: f64, to_m: f64, pieces: &mut Vec<Piece>) -> Result<[Point; 2], RoadError> {
+    fn cut(&self, from_m: f64, to_m: f64, pieces: &mut Vec<Piece>) -> Result<[CentrePoint; 2], RoadError> {
         let first = self.at(from_m)?;
         let blocks = ((to_m - from_m) / BLOCK_M).ceil().max(1.0);
         let block_m = (to_m - from_m) / blocks;
@@ -241,7 +241,13 @@ impl Interval<'_> {
         Ok([first, last])
     }
 
-    fn piece(&self, from_m: f64, step_m: f64, start: &Point, end: &Point) -> Result<Piece, RoadError> {
+    fn piece(
+        &self,
+        from_m: f64,
+        step_m: f64,
+        start: &CentrePoint,
+        end: &CentrePoint,
+    ) -> Result<Piece, RoadError> {
         let length_m = quadrature(step_m, |ds| {
             (self.at(from_m + ds).map_or(f64::NAN, |p| p.speed), 0.0)
         })

@@ -29,7 +29,7 @@ use serde::Serialize;
 
 use self::error::{RoadError, refuse};
 use self::lane_centre::{MOST_PIECES, Stretch, stretch};
-use self::network::{Leg, Network, Next, listed};
+use self::network::{Network, Next, Passage, listed};
 use self::road::{Lane, Road};
 use super::Course;
 use super::piece::{Piece, Pose};
@@ -104,7 +104,7 @@ pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course
 /// A course in the making: where it has come to.
 struct Drive<'n, 'a> {
     network: &'n Network<'a>,
-    leg: Leg,
+    passage: Passage,
     lane: i32,
     pieces: Vec<Piece>,
     segments: Vec<super::Segment>,
@@ -117,10 +117,10 @@ struct Drive<'n, 'a> {
 impl<'n, 'a> Drive<'n, 'a> {
     fn begin(network: &'n Network<'a>, choice: &LaneChoice) -> Result<Self, RoadError> {
         let mut notes = Vec::new();
-        let (leg, lane) = choice::start(network, choice, &mut notes)?;
+        let (passage, lane) = choice::start(network, choice, &mut notes)?;
         Ok(Self {
             network,
-            leg,
+            passage,
             lane,
             pieces: Vec::new(),
             segments: Vec::new(),
@@ -133,7 +133,7 @@ impl<'n, 'a> Drive<'n, 'a> {
     /// Drives on from road to road until the way ends.
     fn follow(&mut self) -> Result<(), RoadError> {
         loop {
-            let (index, along) = self.leg;
+            let (index, along) = self.passage;
             let id = self.network.roads[index].id;
             let here = RoadUsed {
                 road: id.into(),
@@ -152,24 +152,24 @@ impl<'n, 'a> Drive<'n, 'a> {
                 return Ok(());
             };
             let lane = self.lane;
-            (self.leg, self.lane) = match self.network.next(self.leg, Some(lane))? {
+            (self.passage, self.lane) = match self.network.next(self.passage, Some(lane))? {
                 Next::End => return Ok(()),
                 Next::Outside(target, what) => {
                     self.outside = Some(target);
                     self.notes.push(format!("the way ends with road {id}: {what}"));
                     return Ok(());
                 }
-                Next::Road(leg) => match one_link(lane, &links) {
-                    Some(next) => (leg, next),
+                Next::Road(passage) => match one_link(lane, &links) {
+                    Some(next) => (passage, next),
                     None => {
-                        let next = self.network.roads[leg.0].id;
+                        let next = self.network.roads[passage.0].id;
                         self.notes.push(format!(
                             "the way ends with road {id}: lane {lane} goes on to no lane of road {next}"
                         ));
                         return Ok(());
                     }
                 },
-                Next::Connection(leg, to) => (leg, to.unwrap_or(lane)),
+                Next::Connection(passage, to) => (passage, to.unwrap_or(lane)),
                 Next::Junction(junction, ways) => {
                     self.notes.push(match &ways[..] {
                         [] => format!("the way ends at junction {junction}: road {id} lane {lane} does not go on there"),

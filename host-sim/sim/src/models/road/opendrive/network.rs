@@ -8,7 +8,7 @@ use super::error::{RoadError, refuse};
 use super::xml::{child, children, text};
 
 /// A road and the direction in which it is driven: along its s or against it.
-pub(super) type Leg = (usize, bool);
+pub(super) type Passage = (usize, bool);
 
 /// The roads of a file by their links, their insides unread.
 pub(super) struct Network<'a> {
@@ -35,9 +35,9 @@ pub(super) enum Next<'a> {
     /// A road or a junction that is not in the file: its id, and the sentence.
     Outside(&'a str, String),
     /// A road; the link of the lane says which lane.
-    Road(Leg),
+    Road(Passage),
     /// A way through a junction, and which lane it gives to ours, if it says so.
-    Connection(Leg, Option<i32>),
+    Connection(Passage, Option<i32>),
     /// A junction that leads on to none or to several roads.
     Junction(&'a str, Vec<Way<'a>>),
 }
@@ -48,7 +48,7 @@ pub(super) struct Way<'a> {
     /// The connecting road.
     road: &'a str,
     /// None if it is not in the file.
-    leg: Option<Leg>,
+    passage: Option<Passage>,
     /// The road behind the junction.
     beyond: Option<&'a str>,
     lane: Option<i32>,
@@ -106,11 +106,11 @@ impl<'a> Network<'a> {
         found.ok_or_else(|| format!("it has no road {id}; it has {}", listed()).into())
     }
 
-    /// What comes after a leg, for a lane of it if one is given.
+    /// What comes after a passage, for a lane of it if one is given.
     ///
     /// # Errors
     /// A link that names nothing, or no end of a road.
-    pub(super) fn next(&self, (road, along): Leg, lane: Option<i32>) -> Result<Next<'a>, RoadError> {
+    pub(super) fn next(&self, (road, along): Passage, lane: Option<i32>) -> Result<Next<'a>, RoadError> {
         let RoadNode { id, node, .. } = self.roads[road];
         let side = if along { "successor" } else { "predecessor" };
         let Some(link) = child(node, "link").and_then(|link| child(link, side)) else {
@@ -165,7 +165,7 @@ impl<'a> Network<'a> {
         &self,
         junction: &'a str,
         node: Node<'a, 'a>,
-        (road, along): Leg,
+        (road, along): Passage,
         lane: Option<i32>,
     ) -> Next<'a> {
         let id = self.roads[road].id;
@@ -184,11 +184,11 @@ impl<'a> Network<'a> {
                 .map(|[_, to]| *to);
             if lane.is_none() || pairs.is_empty() || ours.is_some() {
                 let straight = lane.map(|lane| if at_start == along { lane } else { -lane });
-                let leg = self.by_id.get(to).map(|&target| (target, at_start));
+                let passage = self.by_id.get(to).map(|&target| (target, at_start));
                 ways.push(Way {
                     road: to,
-                    leg,
-                    beyond: leg.and_then(|leg| self.linked_road(leg)),
+                    passage,
+                    beyond: passage.and_then(|passage| self.linked_road(passage)),
                     lane: ours.or(straight),
                 });
             }
@@ -203,8 +203,10 @@ impl<'a> Network<'a> {
         };
         match way {
             Some(Way {
-                leg: Some(leg), lane, ..
-            }) => Next::Connection(*leg, *lane),
+                passage: Some(passage),
+                lane,
+                ..
+            }) => Next::Connection(*passage, *lane),
             Some(Way { road, .. }) => Next::Outside(
                 road,
                 format!("junction {junction} leads on to road {road}, which is not in the file"),
@@ -213,23 +215,25 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// The road that a leg's own link names.
-    fn linked_road(&self, (road, along): Leg) -> Option<&'a str> {
+    /// The road that a passage's own link names.
+    fn linked_road(&self, (road, along): Passage) -> Option<&'a str> {
         let side = if along { "successor" } else { "predecessor" };
         let link = child(self.roads[road].node, "link").and_then(|link| child(link, side))?;
         text(link, "elementId").filter(|_| text(link, "elementType") != Some("junction"))
     }
 
-    /// The legs from one on, for as long as there is one way only; a ring ends where it began.
-    pub(super) fn chain(&self, start: Leg) -> Result<(Vec<Leg>, Option<Next<'a>>), RoadError> {
-        let (mut legs, mut seen) = (vec![start], HashSet::from([start.0]));
+    /// The passages from one on, for as long as there is one way only; a ring ends where it began.
+    pub(super) fn chain(&self, start: Passage) -> Result<(Vec<Passage>, Option<Next<'a>>), RoadError> {
+        let (mut passages, mut seen) = (vec![start], HashSet::from([start.0]));
         loop {
-            let next = self.next(legs[legs.len() - 1], None)?;
+            let next = self.next(passages[passages.len() - 1], None)?;
             match next {
-                Next::Road(leg) | Next::Connection(leg, _) if seen.insert(leg.0) => legs.push(leg),
-                Next::Junction(..) => return Ok((legs, Some(next))),
-                Next::Outside(..) => return Ok((legs, Some(next))),
-                Next::End | Next::Road(_) | Next::Connection(..) => return Ok((legs, None)),
+                Next::Road(passage) | Next::Connection(passage, _) if seen.insert(passage.0) => {
+                    passages.push(passage)
+                }
+                Next::Junction(..) => return Ok((passages, Some(next))),
+                Next::Outside(..) => return Ok((passages, Some(next))),
+                Next::End | Next::Road(_) | Next::Connection(..) => return Ok((passages, None)),
             }
         }
     }

@@ -9,7 +9,7 @@ use crate::models::road::piece::Pose;
 
 /// A point of the reference line.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Point {
+pub(super) struct CurvePoint {
     pub(super) pose: Pose,
     pub(super) curvature_1pm: f64,
     /// Change of the curvature with arc length, 1/m^2.
@@ -115,7 +115,7 @@ impl Polynomial {
         p
     }
 
-    pub(super) fn at(&self, ds: f64) -> Point {
+    pub(super) fn at(&self, ds: f64) -> CurvePoint {
         let p = self.parameter(ds * self.stretch);
         let ([u, u1, u2, u3], [v, v1, v2, v3]) = (derivatives(self.u, p), derivatives(self.v, p));
         let square = u1 * u1 + v1 * v1;
@@ -124,7 +124,7 @@ impl Polynomial {
         let curvature_1pm = cross / (square * speed);
         let by_parameter =
             (u1 * v3 - v1 * u3) / (square * speed) - 3.0 * curvature_1pm * (u1 * u2 + v1 * v2) / square;
-        Point {
+        CurvePoint {
             pose: Pose {
                 x_m: u,
                 y_m: v,

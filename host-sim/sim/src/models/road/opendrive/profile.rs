@@ -58,7 +58,7 @@ impl Profile {
     }
 
     /// The polynomial that is valid at a place.
-    pub(super) fn of(&self, s_m: f64) -> Cubic {
+    pub(super) fn piece_at(&self, s_m: f64) -> Cubic {
         let after = self.0.partition_point(|cubic| cubic.start_m <= s_m);
         after
             .checked_sub(1)

@@ -128,13 +128,13 @@ impl<'a> Road<'a> {
     /// Slope of the surface across the road beside the superelevation, rad, positive where left is higher.
     pub(super) fn cross_slope(&self, s_m: f64, middle_m: f64, t_m: f64) -> f64 {
         let side = usize::from(t_m < 0.0);
-        let fall = self.crossfall[side].of(middle_m).at(s_m)[0];
+        let fall = self.crossfall[side].piece_at(middle_m).at(s_m)[0];
         let outward = if t_m < 0.0 { fall } else { -fall };
         let after = self.shapes.partition_point(|(s, _)| *s <= middle_m);
         let Some(index) = after.checked_sub(1) else {
             return outward;
         };
-        let slope = |index: usize| self.shapes[index].1.of(t_m).at(t_m)[1];
+        let slope = |index: usize| self.shapes[index].1.piece_at(t_m).at(t_m)[1];
         let here = slope(index);
         let shaped = match self.shapes.get(index + 1) {
             Some((next_m, _)) => {

@@ -65,7 +65,7 @@ pub(super) fn of_own(network: &Network, used: &[RoadUsed]) -> Option<(f64, Vec<S
 fn ends(profile: &Profile, geometry: &Geometry, order: usize) -> Option<[f64; 2]> {
     let (from_m, to_m) = (geometry.start_m, geometry.start_m + geometry.length_m);
     let inside = |s_m: f64| s_m > from_m + CHAINED && s_m < to_m - CHAINED;
-    let cubic = profile.of(0.5 * (from_m + to_m));
+    let cubic = profile.piece_at(0.5 * (from_m + to_m));
     let bent = cubic.factors[order + 2..].iter().any(|factor| *factor != 0.0);
     if bent || profile.starts_m().any(inside) {
         return None;

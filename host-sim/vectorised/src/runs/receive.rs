@@ -10,7 +10,7 @@ const VEHICLE_MS: u32 = 10;
 impl<const N: usize> Runs<N> {
     /// The frames of a step reach the ECUs.
     #[inline(always)]
-    pub(super) fn hear(&mut self, phase: u32, looks: bool, driver_nm: &[f64; N]) {
+    pub(super) fn receive(&mut self, phase: u32, looks: bool, driver_nm: &[f64; N]) {
         let Self {
             worlds,
             ecus,
@@ -23,7 +23,7 @@ impl<const N: usize> Runs<N> {
         let matters = *ecus.matters();
         let mut turns = None;
         if phase.is_multiple_of(VEHICLE_MS) {
-            speeds.hear(ecus, checks, &matters);
+            speeds.receive(ecus, checks, &matters);
             let yaw_rate = senses.yaw_rate(own, &worlds.state[YAW_RATE]);
             checks.vehicle(&yaw_rate, &matters, &mut ecus.suspect);
             turns = Some(yaw_rate);
@@ -62,7 +62,7 @@ impl<const N: usize> Runs<N> {
         let Self { worlds, ecus, .. } = self;
         let (matters, is_heard) = (*ecus.matters(), phase.is_multiple_of(COLUMN_MS));
         worlds
-            .real
+            .nonlinear
             .judge(is_heard, &ecus.applied, &matters, &mut ecus.suspect);
     }
 }

@@ -1,4 +1,4 @@
-//! A world that is less than ideal: vehicle, column and driver's arm apart, coupled at the column's torques.
+//! The nonlinear world: vehicle, column and driver's arm as separate models, coupled by the torques on the column.
 //!
 //! [`SingleTrack`] gives an aligning torque for a wheel angle, [`SteeringColumn`] an angle for torques, the arm of equation (8) a
 //! torque for an angle; the motor stands between what the guidance asks for and what acts. All are stepped together
@@ -36,7 +36,7 @@ type State = [f64; STATES];
 
 /// Vehicle, column, arm and motor of a less than ideal world.
 #[derive(Debug, Clone)]
-pub struct RealPlant {
+pub struct NonlinearPlant {
     /// The vehicle.
     pub vehicle: SingleTrack,
     /// Its column.
@@ -61,7 +61,7 @@ struct Held {
     surroundings: Surroundings,
 }
 
-impl RealPlant {
+impl NonlinearPlant {
     /// A vehicle at rest in its lane. `seed` is of the world's stream.
     pub fn new(
         world: WorldParameters,

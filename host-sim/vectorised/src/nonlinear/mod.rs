@@ -1,4 +1,4 @@
-//! Plants of several runs in worlds that are not the paper's, to the same bits as [`RealPlant`] moves each alone.
+//! Plants of several runs in worlds that are not the paper's, to the same bits as [`NonlinearPlant`] moves each alone.
 //!
 //! Sums, products, quotients and roots are taken for all lanes at once, in that plant's order. Sines and arc tangents are
 //! taken one by one, as the library has them, and only in lanes whose world needs them.
@@ -15,19 +15,19 @@ use super::rejected::Reason;
 use super::{ALIVE, ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::ArmGains;
+use haptic_sim::models::nonlinear::{GRAVITY_M_PER_S2, NonlinearPlant, STATES, Tyres};
 use haptic_sim::models::plant;
-use haptic_sim::models::real::{GRAVITY_M_PER_S2, RealPlant, STATES, Tyres};
 use haptic_sim::models::road::{Centreline, Tracker};
 
 /// Counts of a motor torque on the bus, of 2^-24 N.m.
 const LARGEST_MOTOR: i32 = ((1 << 15) - 1) << 12;
 
-/// In [`RealPlant`]'s order.
+/// In [`NonlinearPlant`]'s order.
 type State<const N: usize> = [[f64; N]; STATES];
 
 /// The plants, of the runs that have one.
 #[repr(C, align(64))]
-pub(super) struct Reals<const N: usize> {
+pub(super) struct NonlinearVehicles<const N: usize> {
     m: [f64; N],
     i: [f64; N],
     l_f: [f64; N],
@@ -62,7 +62,7 @@ pub(super) struct Reals<const N: usize> {
     saturates: [bool; N],
     has_banks: [bool; N],
     /// Of the runs that have one: its wind, and the bank of its whole road.
-    plants: [Option<Box<RealPlant>>; N],
+    plants: [Option<Box<NonlinearPlant>>; N],
     /// Core's check of a motor that does not deliver what it is told at once.
     motors: [Option<Actuator>; N],
     is_any: bool,
@@ -79,7 +79,7 @@ pub(super) struct Acting<'a, const N: usize> {
     pub(super) alive: &'a [u64; N],
 }
 
-impl<const N: usize> Reals<N> {
+impl<const N: usize> NonlinearVehicles<N> {
     pub(super) fn new() -> Self {
         const fn one<const N: usize>() -> [f64; N] {
             [1.0; N]
@@ -121,7 +121,7 @@ impl<const N: usize> Reals<N> {
     }
 
     /// A new run begins in a lane, with such a plant or without.
-    pub(super) fn begin(&mut self, lane: usize, plant: Option<Box<RealPlant>>, has_banks: bool) {
+    pub(super) fn begin(&mut self, lane: usize, plant: Option<Box<NonlinearPlant>>, has_banks: bool) {
         (self.motors[lane], self.has_banks[lane]) = (None, false);
         if let Some(plant) = &plant {
             let (track, column, world, driver) = (&plant.vehicle, &plant.column, &plant.world, &plant.driver);
@@ -156,7 +156,10 @@ impl<const N: usize> Reals<N> {
             ] {
                 all[lane] = value;
             }
-            self.saturates[lane] = track.tyres == Tyres::Saturating;
+            self.saturates[lane] = match track.tyres {
+                Tyres::Linear => false,
+                Tyres::Saturating => true,
+            };
             self.has_banks[lane] = has_banks;
             let is_ideal = world.motor_lag_s == 0.0 && world.motor_error == 0.0;
             self.motors[lane] = (!is_ideal).then(Actuator::default);
@@ -288,7 +291,7 @@ impl<const N: usize> Reals<N> {
 }
 
 /// Acceleration across on a road with a bank, m/s2.
-fn gravity(bank_rad: f64, plant: &RealPlant) -> f64 {
+fn gravity(bank_rad: f64, plant: &NonlinearPlant) -> f64 {
     -GRAVITY_M_PER_S2 * (bank_rad + plant.world.bank_rad).sin()
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::models::plant::Transition;
+use crate::models::runge_kutta;
 
 const V: f64 = 60.0 / 3.6;
 
@@ -9,7 +10,7 @@ fn largest_difference(world: WorldParameters, target_rad: f64) -> [f64; 5] {
     let gains = ArmGains { k_d: 3.0, k_hg: 0.5 };
     let transition = Transition::new(V, &vehicle, &driver, gains);
     let (mut linear, mut plant) = (Plant::default(), Plant::default());
-    let mut real = RealPlant::new(world, &vehicle, &driver, 1);
+    let mut nonlinear = NonlinearPlant::new(world, &vehicle, &driver, 1);
     let (mut worst, mut most) = ([0.0_f64; 5], [0.0_f64; 5]);
     let target = |step: u32| target_rad * (1.5 * f64::from(step) * STEP_S).sin();
     for step in 0..8000 {
@@ -20,7 +21,7 @@ fn largest_difference(world: WorldParameters, target_rad: f64) -> [f64; 5] {
             remnant_nm: 0.0,
         };
         linear.step(&transition, &input);
-        real.step(&mut plant, [V; 2], gains, &input, 0.0);
+        nonlinear.step(&mut plant, [V; 2], gains, &input, 0.0);
         let [a, b] = [&linear, &plant].map(Plant::state);
         let pairs = [
             [a.sideslip_rad, b.sideslip_rad],
@@ -66,7 +67,7 @@ fn steady(world: WorldParameters, lateral_m_per_s2: f64, v: f64, gains: ArmGains
     let (l, p) = (vehicle.l_f + vehicle.l_r, &vehicle);
     let stability = p.m * (p.l_r * p.k_r - p.l_f * p.k_f) / (2.0 * l * l * p.k_f * p.k_r);
     let wheel_rad = lateral_m_per_s2 * l * (1.0 + stability * v * v) / (v * v) / p.k_t;
-    let mut real = RealPlant::new(world, &vehicle, &driver, 1);
+    let mut nonlinear = NonlinearPlant::new(world, &vehicle, &driver, 1);
     let mut plant = Plant::default();
     for _ in 0..20_000 {
         // A stiff hand.
@@ -76,7 +77,7 @@ fn steady(world: WorldParameters, lateral_m_per_s2: f64, v: f64, gains: ArmGains
             remnant_nm,
             ..PlantInput::default()
         };
-        real.step(&mut plant, [v; 2], gains, &input, bank);
+        nonlinear.step(&mut plant, [v; 2], gains, &input, bank);
     }
     plant.state()
 }
@@ -122,7 +123,7 @@ fn friction_holds_the_wheel_until_it_is_overcome() {
     };
     let (vehicle, driver) = (VehicleParameters::default(), DriverParameters::default());
     let turned = |torque_nm: f64| {
-        let mut real = RealPlant::new(world, &vehicle, &driver, 1);
+        let mut nonlinear = NonlinearPlant::new(world, &vehicle, &driver, 1);
         let mut plant = Plant::default();
         for step in 0..8000 {
             // A ramp of 4 s: a sudden torque would swing.
@@ -130,7 +131,7 @@ fn friction_holds_the_wheel_until_it_is_overcome() {
                 guidance_torque_nm: torque_nm * (f64::from(step) / 4000.0).min(1.0),
                 ..PlantInput::default()
             };
-            real.step(&mut plant, [V; 2], ArmGains { k_d: 0.0, k_hg: 0.0 }, &input, 0.0);
+            nonlinear.step(&mut plant, [V; 2], ArmGains { k_d: 0.0, k_hg: 0.0 }, &input, 0.0);
         }
         plant.state().wheel_rad.to_degrees()
     };
@@ -263,7 +264,7 @@ fn under_braking_a_step_is_as_exact_as_a_fine_runge_kutta() {
     let target = |t: f64| 0.5 * (1.5 * t).sin() + 0.2;
     let gains = ArmGains { k_d: 3.0, k_hg: 0.5 };
     let (vehicle, driver) = (VehicleParameters::default(), DriverParameters::default());
-    let mut real = RealPlant::new(WorldParameters::default(), &vehicle, &driver, 1);
+    let mut nonlinear = NonlinearPlant::new(WorldParameters::default(), &vehicle, &driver, 1);
     let (mut plant, mut x) = (Plant::default(), [0.0; 8]);
     for step in 0..8000_u32 {
         let [from, to] = [step, step + 1].map(|step| f64::from(step) * STEP_S);
@@ -274,25 +275,14 @@ fn under_braking_a_step_is_as_exact_as_a_fine_runge_kutta() {
             guidance_torque_nm: t_h,
             remnant_nm: 0.0,
         };
-        real.step(&mut plant, [speed(from), speed(to)], gains, &input, 0.0);
+        nonlinear.step(&mut plant, [speed(from), speed(to)], gains, &input, 0.0);
         let h = STEP_S / 10.0;
         for i in 0..10_u32 {
-            let at = |x: &[f64; 8], part: f64| {
+            x = runge_kutta(&x, h, |x, part| {
                 let share = (f64::from(i) + part) / 10.0;
-                derivatives(
-                    x,
-                    speed(from + share * STEP_S),
-                    now + (next - now) * share,
-                    t_h,
-                    gains,
-                )
-            };
-            let plus = |k: &[f64; 8], h: f64| std::array::from_fn(|j| x[j] + h * k[j]);
-            let k1 = at(&x, 0.0);
-            let k2 = at(&plus(&k1, h / 2.0), 0.5);
-            let k3 = at(&plus(&k2, h / 2.0), 0.5);
-            let k4 = at(&plus(&k3, h), 1.0);
-            x = std::array::from_fn(|j| x[j] + h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]));
+                let (v, target) = (speed(from + share * STEP_S), now + (next - now) * share);
+                derivatives(x, v, target, t_h, gains)
+            });
         }
         let (state, v) = (plant.state(), speed(to));
         let found = [

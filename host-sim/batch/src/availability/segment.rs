@@ -1,4 +1,4 @@
-//! One leg: five minutes, one car, one road.
+//! One segment: five minutes, one car, one road.
 
 use haptic_core::safety::modes::Mode;
 use haptic_sim::Scenario;
@@ -15,26 +15,26 @@ use super::roads::falling_and_rising;
 use super::{CARS, Road, WorldKind};
 use crate::error::StudyError;
 
-/// Which leg.
+/// Which segment.
 #[derive(Debug, Clone, Copy)]
-pub struct LegNumber {
+pub struct SegmentNumber {
     /// The world.
     pub world: &'static WorldKind,
     /// The road.
     pub road: &'static Road,
-    /// Counted from zero; legs of one number share course, driver, car and noise.
+    /// Counted from zero; segments of one number share course, driver, car and noise.
     pub number: u32,
 }
 
-/// What a leg showed, as a line of a file holds it.
+/// What a segment showed, as a line of a file holds it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Leg {
+pub struct DriveSegment {
     /// Name of the world.
     pub world: String,
     /// Name of the road.
     pub road: String,
-    /// Which leg.
+    /// Which segment.
     pub number: u32,
     /// Which car.
     pub car: u64,
@@ -66,7 +66,7 @@ pub struct ByHand {
     pub largest_error_m: f64,
 }
 
-/// How a leg ended.
+/// How a segment ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ended {
@@ -82,7 +82,7 @@ pub enum Ended {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Declaration {
-    /// When, s after the start of the leg.
+    /// When, s after the start of the segment.
     pub time_s: f64,
     /// The faults that the ECU named, joined by a plus.
     pub faults: String,
@@ -90,7 +90,7 @@ pub struct Declaration {
     pub lateral_m_per_s2: f64,
 }
 
-impl Leg {
+impl DriveSegment {
     /// Whether this driver leaves the road with this car by hand too: then the drive says nothing of guidance.
     pub fn is_lost_by_hand(&self) -> bool {
         self.by_hand.ended == Ended::Diverged
@@ -101,14 +101,14 @@ impl Leg {
         !self.declarations.is_empty() || self.ended != Ended::Whole || self.is_lost_by_hand()
     }
 
-    /// Whether it is the leg of that number.
-    pub fn is(&self, number: &LegNumber) -> bool {
+    /// Whether it is the segment of that number.
+    pub fn is(&self, number: &SegmentNumber) -> bool {
         self.number == number.number && self.world == number.world.name && self.road == number.road.name
     }
 }
 
-impl LegNumber {
-    /// The scenario of this leg.
+impl SegmentNumber {
+    /// The scenario of this segment.
     ///
     /// # Errors
     /// As [`haptic_sim::scenario::ScenarioBuilder::build`]; no built-in world meets one.
@@ -147,20 +147,26 @@ impl LegNumber {
     /// Drives it alone, with the shipping ECU.
     ///
     /// # Errors
-    /// As [`LegNumber::scenario`].
-    pub fn drive(&self, root: u64) -> Result<Leg, StudyError> {
+    /// As [`SegmentNumber::scenario`].
+    pub fn drive(&self, root: u64) -> Result<DriveSegment, StudyError> {
         let scenario = self.scenario(root)?;
         let (run, reported) = with_ecu(&scenario, self.world.happens());
-        Ok(self.leg(&scenario, &run, reported, ByHand::of(&by_hand(&scenario))))
+        Ok(self.segment(&scenario, &run, reported, ByHand::new(&by_hand(&scenario))))
     }
 
     /// What two drives showed.
-    pub(super) fn leg(&self, scenario: &Scenario, run: &Run, reported: Reported, by_hand: ByHand) -> Leg {
+    pub(super) fn segment(
+        &self,
+        scenario: &Scenario,
+        run: &Run,
+        reported: Reported,
+        by_hand: ByHand,
+    ) -> DriveSegment {
         let errors_m = || run.trace.samples.iter().map(|sample| sample.lateral_error_m);
         let samples = (run.trace.samples.len() as f64).max(1.0);
         let sum = |of: fn(f64) -> f64| errors_m().map(of).fold(0.0, |sum, x| sum + x);
         let mean_m = sum(|error_m| error_m) / samples;
-        Leg {
+        DriveSegment {
             world: self.world.name.into(),
             road: self.road.name.into(),
             number: self.number,
@@ -184,7 +190,7 @@ impl LegNumber {
 }
 
 impl ByHand {
-    pub(super) fn of(run: &Run) -> Self {
+    pub(super) fn new(run: &Run) -> Self {
         Self {
             ended: match run.ending {
                 Ending::Diverged { .. } => Ended::Diverged,

@@ -1,9 +1,9 @@
-//! The equations of the plants, in the order of `models::real`.
+//! The equations of the plants, in the order of `models::nonlinear`.
 
-use super::{Acting, Reals, State};
-use haptic_sim::models::real::{FULL_ASSIST_AT_NM, RIPPLES, STATES, TRAIL_SHAPE};
+use super::{Acting, NonlinearVehicles, State};
+use haptic_sim::models::nonlinear::{FULL_ASSIST_AT_NM, RIPPLES, STATES, TRAIL_SHAPE};
 
-impl<const N: usize> Reals<N> {
+impl<const N: usize> NonlinearVehicles<N> {
     /// The rates of the states at a share of the step.
     #[inline(always)]
     pub(super) fn rates(&self, x: &State<N>, share: f64, acting: &Acting<N>, moves: &[bool; N]) -> State<N> {

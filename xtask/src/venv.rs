@@ -1,0 +1,53 @@
+//! Virtual environments of Python, each made once.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::tool::{command, root, run};
+
+/// What the tests of the package, its examples, and the peers of recordings and FMUs need.
+pub(crate) const PACKAGES: [&str; 18] = [
+    "asammdf",
+    "cantools",
+    "commonroad-vehicle-models",
+    "distributed",
+    "fmpy",
+    "gymnasium>=1.1",
+    "ipykernel",
+    "matplotlib",
+    "mcap",
+    "mypy",
+    "nbclient",
+    "numpy",
+    "pandas",
+    "pyarrow",
+    "pytest",
+    "python-can",
+    "scipy",
+    "tqdm",
+];
+
+/// The interpreter of the environment that all checks share, made where it is not there.
+pub(crate) fn environment() -> Result<PathBuf> {
+    environment_of(&root().join("target/python/checks"), &PACKAGES)
+}
+
+/// The interpreter of an environment with these packages.
+pub(crate) fn environment_of(place: &Path, packages: &[&str]) -> Result<PathBuf> {
+    let python = place.join("bin/python");
+    if !python.exists() {
+        run(command("python3").args(["-m", "venv"]).arg(place))
+            .context("Python 3 with venv is needed: apt-get install python3-venv")?;
+    }
+    let installed = place.join("packages.txt");
+    let list = packages.join("\n");
+    if std::fs::read_to_string(&installed).is_ok_and(|there| there == list) {
+        return Ok(python);
+    }
+    run(command(&python.to_string_lossy())
+        .args(["-m", "pip", "install", "-q", "--disable-pip-version-check"])
+        .args(packages))?;
+    std::fs::write(&installed, list)?;
+    Ok(python)
+}
