@@ -7,6 +7,7 @@ use haptic_sim::guidance::{OverBus, OwnLaw};
 use haptic_sim::laws::{Gains, Law, LawView};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::scenario::GuidanceParameters;
 use haptic_sim::{Action, Scenario, Simulation};
 
@@ -28,17 +29,51 @@ const ACTIVITY: Params = Params {
     ..Params::PAPER
 };
 
-/// The law in f64 at the instants of the ECU's: it looks 120 times a second, a step after a lane sample and not with a vehicle frame,
-/// and the share acts from the next vehicle frame on, 10 ms apart.
+/// The filtered rate of the wheel in f64.
+#[derive(Clone)]
+struct Rate {
+    last: (f64, f64),
+    rate: f64,
+}
+
+impl Rate {
+    fn take(&mut self, value: f64, at_s: f64) {
+        let tau_s = 1.0 / (std::f64::consts::TAU * Params::PAPER.rate_corner_hz);
+        let between_s = at_s - self.last.1;
+        self.rate = (tau_s * self.rate + value - self.last.0) / (tau_s + between_s);
+        self.last = (value, at_s);
+    }
+}
+
+/// The law in f64 at the instants of the ECU's. The column sends every 2 ms, the vehicle every 10 ms. The law looks at the last column
+/// frame in the step after a lane sample, or one later where a vehicle frame comes in that step and the last look is more than 12 ms
+/// old; its rate is that of the wheel between looks. The share acts from the next vehicle frame on.
 #[derive(Clone)]
 struct Sampled {
     paper: Gains,
     least: f64,
+    /// The last column frame: driver torque, wheel angle, and when it came.
+    column: [f64; 2],
+    column_step: u32,
     looked: u32,
     /// A lane sample waits for its check.
-    lane_is_new: bool,
+    is_due: bool,
+    rate: Rate,
     sums: [f64; 2],
     share: f64,
+}
+
+impl Sampled {
+    fn look(&mut self, guidance_torque_nm: f64) {
+        let [driver_torque_nm, wheel_angle_rad] = self.column;
+        let at_s = f64::from(self.column_step) * 1e-3;
+        let weight = f64::from(self.column_step - self.looked) * 1e-3 / 0.5;
+        self.rate.take(wheel_angle_rad, at_s);
+        let product = driver_torque_nm * guidance_torque_nm * self.rate.rate.powi(2);
+        self.sums[0] += weight * (product - self.sums[0]);
+        self.sums[1] += weight * (product.abs() - self.sums[1]);
+        self.looked = self.column_step;
+    }
 }
 
 impl Law for Sampled {
@@ -48,15 +83,17 @@ impl Law for Sampled {
             let against = (-self.sums[0] / self.sums[1]).max(0.0);
             self.share = 1.0 - (1.0 - self.least) * against;
         }
-        if self.lane_is_new && !has_motion {
-            let weight = f64::from(view.step - self.looked) * 1e-3 / 0.5;
-            let rate = view.wheel_rate_rad_per_s;
-            let product = view.driver_torque_nm * view.guidance_torque_nm * rate * rate;
-            self.sums[0] += weight * (product - self.sums[0]);
-            self.sums[1] += weight * (product.abs() - self.sums[1]);
-            self.looked = view.step;
+        if view.step.is_multiple_of(2) {
+            self.column = [view.driver_torque_nm, view.wheel_angle_rad];
+            self.column_step = view.step;
         }
-        self.lane_is_new = (view.step * 120) / 1000 != (view.step.saturating_sub(1) * 120) / 1000;
+        if self.is_due {
+            self.is_due = has_motion && self.column_step - self.looked > 12;
+            if !has_motion {
+                self.look(view.guidance_torque_nm);
+            }
+        }
+        self.is_due |= camera_looks(view.step);
         self.share * self.paper.ask(view)
     }
 }
@@ -69,8 +106,14 @@ fn apart(params: Params, kmh: f64) -> [f64; 2] {
     let law = Sampled {
         paper: Gains::PAPER,
         least: params.activity_lambda_min,
+        column: [0.0; 2],
+        column_step: 0,
         looked: 0,
-        lane_is_new: false,
+        is_due: false,
+        rate: Rate {
+            last: (0.0, 0.0),
+            rate: 0.0,
+        },
         sums: [0.0; 2],
         share: 1.0,
     };
