@@ -11,15 +11,16 @@
     reason = "parameters are SI values in f64, turned into bits at compile time or before the first step"
 )]
 
-use crate::controller::params::{DRIVER_ACTIVITY, ParamError, Params, in_range};
+use crate::controller::params::{DRIVER_ACTIVITY, FDCA, LAWS, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
 use crate::law::activity::{LeastShare, TimeAndShare};
+use crate::law::fdca::Choices;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
-    CurvaturePerAngle, Micros, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
-    TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+    AnglePerLength, CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::safety::envelope::Envelope;
 use crate::safety::monitor::Monitor;
@@ -69,12 +70,12 @@ impl Config {
         if let Err(error) = p.check() {
             return Err(error);
         }
-        if p.law != 0.0 && p.law != DRIVER_ACTIVITY {
+        if p.law != p.law as u32 as f64 {
             return Err(ParamError {
                 name: "law",
                 value: p.law,
                 min: 0.0,
-                max: DRIVER_ACTIVITY,
+                max: (LAWS.len() - 1) as f64,
                 unit: "in whole numbers",
             });
         }
@@ -100,6 +101,7 @@ impl Config {
     /// The configuration of parameters that are in range.
     const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
+        let tau = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
         let between_us = (f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32;
         let least_share = if p.law == DRIVER_ACTIVITY {
             Some(LeastShare::from_si(p.activity_lambda_min))
@@ -107,12 +109,21 @@ impl Config {
             None
         };
         Self {
-            law: Law {
-                e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
-                e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
-                e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
-                e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
-                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
+            law: if p.law == FDCA {
+                let choices = Choices {
+                    k_y: AnglePerLength::from_rad_per_m(p.fdca_k_y_rad_per_m),
+                    k_psi: Ratio::from_si(p.fdca_k_psi),
+                    lohs: Ratio::from_si(p.fdca_lohs),
+                };
+                Law::of_choices(choices, tau)
+            } else {
+                Law {
+                    e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
+                    e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
+                    e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
+                    e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
+                    tau,
+                }
             },
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),

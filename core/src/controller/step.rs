@@ -6,6 +6,7 @@ use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
 use crate::law::activity::Activity;
+use crate::law::fdca::{Car, Choices};
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
@@ -138,8 +139,7 @@ impl<I: Injection> Step<'_, I> {
             checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let ego = self.ego_motion(v, last);
-        let demanded = self.config.law.demanded(&v.law, self.now, ego.as_ref());
+        let demanded = self.demanded(v, last);
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
@@ -592,6 +592,29 @@ impl<I: Injection> Step<'_, I> {
         self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
+    /// What the law demands for the sample that it took last.
+    #[inline(always)]
+    fn demanded(&self, v: &Memory, sample: LaneSample) -> Torque {
+        let ego = self.ego_motion(v, sample);
+        match self.config.law.choices() {
+            None => self.config.law.demanded(&v.law, self.now, ego.as_ref()),
+            Some(choices) => self.fdca(choices, v, ego),
+        }
+    }
+
+    /// The same of FDCA. Not inlined, so that it costs (9) nothing.
+    #[cold]
+    #[inline(never)]
+    fn fdca(&self, choices: Choices, v: &Memory, ego: Option<EgoMotion>) -> Torque {
+        let car = Car {
+            speed: v.plausibility.speed(),
+            turning_gain: v.plausibility.turning_gain(),
+            turning: v.plausibility.turning(),
+            aligning: self.config.plausibility.aligning_gain,
+        };
+        choices.demanded(&v.law, self.now, ego.as_ref(), &car)
+    }
+
     /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
     /// ends guidance then. Without a lane the torque is zero.
     fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
@@ -600,9 +623,7 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(ChangedParts::LAW);
                 self.config.law.update(&mut v.law, sample);
             }
-            self.config
-                .law
-                .demanded(&v.law, self.now, self.ego_motion(v, sample).as_ref())
+            self.demanded(v, sample)
         });
         let demanded = self.injection.law(v.coast.limited(demanded));
         // Clamped to 0 to 1: beyond that the host is wrong.

@@ -205,6 +205,11 @@ impl PlausibilityState {
         self.motion.speed
     }
 
+    /// The yaw rate per wheel angle at that speed.
+    pub(crate) const fn turning_gain(&self) -> TurningRatePerAngle {
+        self.motion.turning_gain
+    }
+
     /// Compares two speeds that arrive `passed` after the last ones. Returns whether they agree, and whether they
     /// have agreed at some time within `SPEEDS_PATIENCE`.
     #[must_use]
