@@ -322,6 +322,7 @@ impl Controller {
             applied,
             inputs,
             lane: inputs.lane,
+            is_late: false,
             elapsed: now.since(memory.fast.last_step),
             injection,
         };

@@ -62,6 +62,8 @@ pub(super) struct Step<'a, I> {
     pub(super) inputs: &'a Inputs,
     /// The lane that the law uses: the input's, or the last one, extrapolated.
     pub(super) lane: Input<LaneSample>,
+    /// It was old when it arrived.
+    pub(super) is_late: bool,
     pub(super) elapsed: Micros,
     pub(super) injection: &'a I,
 }
@@ -139,7 +141,12 @@ impl<I: Injection> Step<'_, I> {
             checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let demanded = self.demanded(v, last);
+        let is_late = self.came_late(v, last);
+        let demanded = if self.config.law.is_fdca() {
+            self.demanded_by_fdca(v, last, is_late)
+        } else {
+            self.demanded_by_paper(v, last, is_late)
+        };
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
@@ -182,7 +189,7 @@ impl<I: Injection> Step<'_, I> {
     /// Takes new inputs through the plausibility checks, and forgets what the checks know of lost ones. Returns the faults of
     /// lost inputs.
     fn update_inputs(
-        &self,
+        &mut self,
         v: &mut Memory,
         changed: &mut ChangedParts,
         fast_enough: Option<bool>,
@@ -383,12 +390,12 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// How far the vehicle has turned since the lane sample in use, where that was old when it arrived.
-    fn compensate_age(&self, v: &mut Memory, motion_history: &MotionHistory) {
+    fn compensate_age(&mut self, v: &mut Memory, motion_history: &MotionHistory) {
         let Some(sample) = self.lane.value() else {
             return;
         };
-        let age = self.now.since(sample.at);
-        if age.us().saturating_sub(self.now.since(v.input_times.lane).us()) <= PROMPT.us() {
+        self.is_late = self.came_late(v, sample);
+        if !self.is_late {
             (v.fast.turned, v.fast.rate_then) = (Radians::ZERO, TurningRate::ZERO);
         } else if let Input::New(_) = self.lane {
             (v.fast.turned, v.fast.rate_then) = motion_history.turned(self.now, sample.at);
@@ -398,23 +405,26 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
-    /// How the vehicle's motion since an old sample differs from going on at the rate of turn that it had then; `None` for a
-    /// sample that was not old.
+    /// Whether a sample was old when it arrived.
     #[inline(always)]
-    fn ego_motion(&self, v: &Memory, sample: LaneSample) -> Option<EgoMotion> {
+    fn came_late(&self, v: &Memory, sample: LaneSample) -> bool {
+        let [age, held] = [sample.at, v.input_times.lane].map(|at| self.now.since(at).us());
+        age.saturating_sub(held) > PROMPT.us()
+    }
+
+    /// How the vehicle's motion since an old sample differs from going on at the rate of turn that it had then.
+    #[inline(always)]
+    fn ego_motion(&self, v: &Memory, sample: LaneSample) -> EgoMotion {
         let age = self.now.since(sample.at);
-        if age.us().saturating_sub(self.now.since(v.input_times.lane).us()) <= PROMPT.us() {
-            return None;
-        }
         let went_on = per_second(v.fast.rate_then.fixed(), age);
         let speed = v.plausibility.speed();
         let near = product(self.config.plausibility.near_time.fixed(), speed.fixed());
-        Some(EgoMotion::new(
+        EgoMotion::new(
             v.fast.turned.minus(Radians::from_fixed(went_on)),
             v.plausibility.turning().minus(v.fast.rate_then),
             speed,
             Metres::from_wide(near),
-        ))
+        )
     }
 
     /// Whether both speeds reach the slowest that is guided, if they are known.
@@ -592,27 +602,33 @@ impl<I: Injection> Step<'_, I> {
         self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
-    /// What the law demands for the sample that it took last.
+    /// What (9) demands for the sample that it took last.
     #[inline(always)]
-    fn demanded(&self, v: &Memory, sample: LaneSample) -> Torque {
-        let ego = self.ego_motion(v, sample);
-        match self.config.law.choices() {
-            None => self.config.law.demanded(&v.law, self.now, ego.as_ref()),
-            Some(choices) => self.fdca(choices, v, ego),
-        }
+    fn demanded_by_paper(&self, v: &Memory, sample: LaneSample, is_late: bool) -> Torque {
+        let ego = is_late.then(|| self.ego_motion(v, sample));
+        self.config.law.demanded(&v.law, self.now, ego.as_ref())
     }
 
-    /// The same of FDCA. Not inlined, so that it costs (9) nothing.
+    /// What FDCA demands for that sample. Not inlined, so that it costs (9) nothing.
     #[cold]
     #[inline(never)]
-    fn fdca(&self, choices: Choices, v: &Memory, ego: Option<EgoMotion>) -> Torque {
+    fn demanded_by_fdca(&self, v: &Memory, sample: LaneSample, is_late: bool) -> Torque {
+        let ego = is_late.then(|| self.ego_motion(v, sample));
         let car = Car {
             speed: v.plausibility.speed(),
             turning_gain: v.plausibility.turning_gain(),
             turning: v.plausibility.turning(),
             aligning: self.config.plausibility.aligning_gain,
         };
-        choices.demanded(&v.law, self.now, ego.as_ref(), &car)
+        Choices::of(&self.config.law).demanded(&v.law, self.now, ego.as_ref(), &car)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn fdca(&self, v: &Memory) -> Torque {
+        self.lane.value().map_or(Torque::ZERO, |sample| {
+            self.demanded_by_fdca(v, sample, self.is_late)
+        })
     }
 
     /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
@@ -623,8 +639,14 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(ChangedParts::LAW);
                 self.config.law.update(&mut v.law, sample);
             }
-            self.demanded(v, sample)
+            self.demanded_by_paper(v, sample, self.is_late)
         });
+        // In the place of (9), whose words make no sense then: asked before, it would cost (9) more.
+        let demanded = if self.config.law.is_fdca() {
+            self.fdca(v)
+        } else {
+            demanded
+        };
         let demanded = self.injection.law(v.coast.limited(demanded));
         // Clamped to 0 to 1: beyond that the host is wrong.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);

@@ -56,19 +56,24 @@ impl Law {
         }
     }
 
-    /// The choices, if the law is FDCA.
-    #[must_use]
+    /// Whether the words are those of FDCA.
     #[inline(always)]
-    pub fn choices(&self) -> Option<Choices> {
-        (self.e_y_rate < TorquePerSpeed::ZERO).then(|| Choices {
-            k_y: AnglePerLength::from_bits(self.e_y.bits()),
-            k_psi: Ratio::from_bits(self.e_theta.bits()),
-            lohs: Ratio::from_bits(self.e_theta_rate.bits()),
-        })
+    pub(crate) fn is_fdca(&self) -> bool {
+        self.e_y_rate < TorquePerSpeed::ZERO
     }
 }
 
 impl Choices {
+    /// Of a law that is FDCA.
+    #[must_use]
+    pub const fn of(law: &Law) -> Self {
+        Self {
+            k_y: AnglePerLength::from_bits(law.e_y.bits()),
+            k_psi: Ratio::from_bits(law.e_theta.bits()),
+            lohs: Ratio::from_bits(law.e_theta_rate.bits()),
+        }
+    }
+
     /// The torque demanded now, from the sample that the law took last.
     #[must_use]
     pub fn demanded(&self, state: &LawState, now: Instant, ego: Option<&EgoMotion>, car: &Car) -> Torque {
