@@ -244,6 +244,14 @@ pub(super) struct Accepted {
     pub(super) request: Option<[u8; 8]>,
 }
 
+/// Bytes of the newest accepted frames, likewise. Not kept twice: a flipped bit lasts until the next frame, for less than the time
+/// for which a torque may be astray.
+#[derive(Debug, Clone)]
+pub(super) struct Newest {
+    pub(super) vehicle: [u8; 8],
+    pub(super) column: [u8; 8],
+}
+
 impl Accepted {
     pub(super) const NONE: Self = Self {
         lane: None,
@@ -297,6 +305,7 @@ pub(super) struct Receivers {
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
     pub(super) accepted: Accepted,
+    pub(super) newest: Newest,
     /// Steps for which a frame under an identifier of this ECU is still a fault. Not kept twice: a flip raises the fault
     /// for a while, or ends it early.
     foreign: u32,
@@ -344,6 +353,10 @@ impl Receivers {
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::NONE,
+            newest: Newest {
+                vehicle: [0; 8],
+                column: [0; 8],
+            },
             foreign: 0,
             standing: Standing {
                 at_most: Speed::ZERO,
@@ -357,6 +370,7 @@ impl Receivers {
         let Self {
             actuator,
             accepted,
+            newest,
             standing,
             ..
         } = self;
@@ -378,6 +392,7 @@ impl Receivers {
                 slot.put(column, now, COLUMN_PERIOD);
                 actuator.deliver(c.motor_torque);
                 accepted.column = Some(*frame.bytes());
+                newest.column = *frame.bytes();
                 Ok(())
             }),
             Vehicle::ID => {
@@ -386,6 +401,7 @@ impl Receivers {
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
+                    newest.vehicle = *frame.bytes();
                     Ok(())
                 });
                 if heard != Some(Ok(())) {

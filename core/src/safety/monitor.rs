@@ -15,7 +15,10 @@
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-use crate::safety::redundant::words;
+mod fdca;
+
+use crate::safety::redundant::{Redundant, words};
+pub use fdca::Fdca;
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -30,7 +33,7 @@ words! {
         pub(crate) band_mnm: i32,
         /// Amplitude of the probe.
         pub(crate) probe_mnm: i32,
-        /// Law, mN.m per m, per rad, per m/s, per rad/s.
+        /// Equation (9), mN.m per m, per rad, per m/s, per rad/s; the third is below zero, and the others zero, where the law is FDCA.
         pub(crate) gains_mnm: [i32; 4],
     }
 }
@@ -95,6 +98,17 @@ pub struct Evidence<'a> {
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
     pub elapsed_us: u32,
+    /// What FDCA needs beside.
+    pub newest: Newest<'a>,
+}
+
+/// Bytes of the newest frames in use, which may have been shown before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Newest<'a> {
+    /// Of the vehicle.
+    pub vehicle: &'a [u8; 8],
+    /// Of the column.
+    pub column: &'a [u8; 8],
 }
 
 /// Modes as the frame codes them; the last with torque is Handover.
@@ -168,12 +182,21 @@ impl Monitor {
     /// `false` it is never renewed.
     #[must_use]
     #[inline(always)]
-    pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
+    pub fn step(
+        &self,
+        state: &mut MonitorState,
+        fdca: &mut Redundant<Fdca>,
+        evidence: &Evidence<'_>,
+    ) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if state.observe(evidence, elapsed_us) {
-            self.update_demand(state);
+        if let Some(apart_us) = state.observe(evidence, elapsed_us) {
+            if self.is_fdca() {
+                ask_fdca(state, fdca, evidence, apart_us);
+            } else {
+                self.update_demand(state);
+            }
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
@@ -241,6 +264,10 @@ impl Monitor {
         }
         let shrink = beyond.saturating_mul(OVERRIDE_SLOPE);
         self.limit_mnm.saturating_sub(shrink).max(0)
+    }
+
+    const fn is_fdca(&self) -> bool {
+        self.gains_mnm[2] < 0
     }
 
     /// What a new lane sample asks for.
@@ -336,9 +363,10 @@ impl Monitor {
 }
 
 impl MonitorState {
-    /// Takes the frames that arrived; `true` for a new lane sample.
+    /// Takes the frames that arrived. With a new lane sample, returns how much newer it is than the last.
     #[inline(always)]
-    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> Option<i32> {
+        let mut newer = None;
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
         let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
         let lane = evidence
@@ -353,6 +381,7 @@ impl MonitorState {
                 .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
                 .saturating_mul(100);
             let apart_us = self.step.age_us.saturating_sub(age_us);
+            newer = Some(apart_us);
             // After a gap there is no rate.
             if self.step.age_us > OLDEST_LANE_US {
                 (self.lane_state.before, self.lane_state.older_us) = (new, 0);
@@ -370,7 +399,7 @@ impl MonitorState {
         if evidence.request.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
             self.step.probe_left_us = PROBE_END_US;
         }
-        lane.is_some()
+        newer
     }
 
     /// How fast the lane errors move, mm/s and urad/s.
@@ -392,6 +421,18 @@ impl MonitorState {
             .saturating_div(span_ms)
             .saturating_mul(1000);
         (e_y_mmps, e_theta_urps)
+    }
+}
+
+/// The same of FDCA, whose copies have to agree. Not inlined, so that it costs (9) nothing.
+#[cold]
+#[inline(never)]
+fn ask_fdca(state: &mut MonitorState, fdca: &mut Redundant<Fdca>, evidence: &Evidence<'_>, apart_us: i32) {
+    if let Some((least, most)) = fdca.change(|fdca| fdca.see(state, evidence, apart_us)) {
+        state.lane_state.position_mnm = least;
+        state.lane_state.rate_mnm = most.saturating_sub(least);
+    } else {
+        state.step.withdrawn = 1;
     }
 }
 
