@@ -227,17 +227,14 @@ impl Ecu {
         command.torque = Guidance::rounded(command.torque);
         let mut guidance = self.guidance(&command, steps);
 
-        let accepted = &self.receivers.accepted;
+        let Receivers { accepted, newest, .. } = &self.receivers;
         let evidence = Evidence {
             lane: accepted.lane.as_ref(),
-            column: accepted.column.as_ref(),
+            column: accepted.column.then_some(&newest.column),
             request: accepted.request.as_ref(),
             guidance: guidance.bytes(),
             elapsed_us,
-            newest: Newest {
-                vehicle: &self.receivers.newest.vehicle,
-                column: &self.receivers.newest.column,
-            },
+            newest,
         };
         let v = self.memory.value_mut();
         let permitted = permits(monitor, &mut v.monitor, &mut self.fdca, &evidence, injection);
@@ -419,10 +416,7 @@ fn passes_self_test<I: Injection>(
             request: None,
             guidance: &guidance,
             elapsed_us: 1000,
-            newest: Newest {
-                vehicle: &guidance,
-                column: &guidance,
-            },
+            newest: &Newest::default(),
         };
         !permits(Some(monitor), &mut state, fdca, &evidence, injection)
     })

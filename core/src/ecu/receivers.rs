@@ -11,6 +11,7 @@ use crate::law::LaneSample;
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
 use crate::safety::actuator::Actuator;
 use crate::safety::faults::Fault;
+use crate::safety::monitor::Newest;
 use crate::safety::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
 use crate::safety::redundant::{Redundant, Words};
 
@@ -240,22 +241,15 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
 #[derive(Debug, Clone)]
 pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
-    pub(super) column: Option<[u8; 8]>,
+    /// Its bytes are the newest.
+    pub(super) column: bool,
     pub(super) request: Option<[u8; 8]>,
-}
-
-/// Bytes of the newest accepted frames, likewise. Not kept twice: a flipped bit lasts until the next frame, for less than the time
-/// for which a torque may be astray.
-#[derive(Debug, Clone)]
-pub(super) struct Newest {
-    pub(super) vehicle: [u8; 8],
-    pub(super) column: [u8; 8],
 }
 
 impl Accepted {
     pub(super) const NONE: Self = Self {
         lane: None,
-        column: None,
+        column: false,
         request: None,
     };
 }
@@ -353,10 +347,7 @@ impl Receivers {
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::NONE,
-            newest: Newest {
-                vehicle: [0; 8],
-                column: [0; 8],
-            },
+            newest: Newest::default(),
             foreign: 0,
             standing: Standing {
                 at_most: Speed::ZERO,
@@ -391,8 +382,7 @@ impl Receivers {
                 };
                 slot.put(column, now, COLUMN_PERIOD);
                 actuator.deliver(c.motor_torque);
-                accepted.column = Some(*frame.bytes());
-                newest.column = *frame.bytes();
+                (accepted.column, newest.column) = (true, *frame.bytes());
                 Ok(())
             }),
             Vehicle::ID => {

@@ -18,7 +18,7 @@
 mod fdca;
 
 use crate::safety::redundant::{Redundant, words};
-pub use fdca::Fdca;
+pub use fdca::{Fdca, Newest};
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -98,17 +98,8 @@ pub struct Evidence<'a> {
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
     pub elapsed_us: u32,
-    /// What FDCA needs beside.
-    pub newest: Newest<'a>,
-}
-
-/// Bytes of the newest frames in use, which may have been shown before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Newest<'a> {
-    /// Of the vehicle.
-    pub vehicle: &'a [u8; 8],
-    /// Of the column.
-    pub column: &'a [u8; 8],
+    /// Frames that may have been shown before.
+    pub newest: &'a Newest,
 }
 
 /// Modes as the frame codes them; the last with torque is Handover.

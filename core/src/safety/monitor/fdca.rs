@@ -42,6 +42,16 @@ words! {
     }
 }
 
+/// Bytes of the newest frames in use. Not kept twice: a flipped bit lasts until the next frame, for less than the time for which a torque
+/// may be astray.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Newest {
+    /// Of the vehicle.
+    pub vehicle: [u8; 8],
+    /// Of the column.
+    pub column: [u8; 8],
+}
+
 /// Two speeds further apart than this are not both right: 2 m/s.
 const SPREAD: i32 = 512;
 /// By how much wheel angle and speed may be wrong about the rate of turn for long: a bank of 8 %, 1.5 deg of the wheel.
@@ -49,7 +59,7 @@ const WHEEL_BIAS_URPS: i32 = 25_000;
 /// How fast the rate of turn changes on a road, urad/s in a millisecond.
 const YAW_ACCELERATION: i32 = 1000;
 /// For so long it may have changed unseen, which the band around all has room for.
-const FRESH_US: i32 = 20_000;
+const FRESH_MS: i32 = 20;
 /// Where pictures were left aside or did not come, the law's rate comes from the lane as it goes on, and for so long a camera's noise
 /// of 1 mrad makes the monitor's differ by so much.
 const UNSETTLED_US: i32 = 200_000;
@@ -62,33 +72,37 @@ const YAW_RATE_FAULT: u32 = 57;
 impl Fdca {
     /// Takes a picture that came so long after the last one. Returns between what torques, mN.m, the law's is.
     pub(super) fn see(&mut self, state: &MonitorState, evidence: &Evidence<'_>, apart_us: i32) -> (i32, i32) {
-        let picture = &state.lane_state;
         let is_silence = apart_us > UNSEEN_US && apart_us / 3 > self.apart_us / 2;
         self.unsettled_us = if is_silence || says_aside(evidence.guidance) {
             UNSETTLED_US
         } else {
             self.unsettled_us.saturating_sub(apart_us).max(0)
         };
-        self.filter(picture.lane.e_theta_urad, apart_us);
+        self.filter(state.lane_state.lane.e_theta_urad, apart_us);
         self.apart_us = apart_us;
-        let turning = self.turning_gain(evidence.newest.vehicle);
-        let (right, left) = range_of_turning(evidence, turning);
+        let turning_gain = self.turning_gain(&evidence.newest.vehicle);
+        let turning = range_of_turning(turning_gain, evidence);
+        self.range(state, turning_gain, turning)
+    }
 
-        let angle = |e_y_mm: i32, e_theta_urad: i32| {
-            times(self.k_y, e_y_mm, 8).saturating_add(times(self.k_psi, e_theta_urad, 8))
+    /// Between what torques the law's is.
+    fn range(&self, state: &MonitorState, turning_gain: i32, (right, left): (i32, i32)) -> (i32, i32) {
+        let picture = &state.lane_state;
+        let asked = |e_y_mm: i32, e_theta_urad: i32| {
+            let angle = times(self.k_y, e_y_mm, 8).saturating_add(times(self.k_psi, e_theta_urad, 8));
+            times(turning_gain, angle, 16)
         };
-        let unseen_us = picture.came_us.saturating_add(apart_us);
+        let unseen_ms = picture.came_us.saturating_add(self.apart_us) / 1000;
         let (e_y_mmps, e_theta_urps) = state.rates();
-        let per_s = times(turning, angle(e_y_mmps, e_theta_urps), 16);
-        let now = times(turning, angle(picture.lane.e_y_mm, picture.lane.e_theta_urad), 16);
-        let later =
-            now.saturating_add((per_s / 1000).saturating_mul(unseen_us.saturating_add(apart_us) / 1000));
-        let changed = (unseen_us.saturating_sub(FRESH_US).max(0) / 1000).saturating_mul(YAW_ACCELERATION);
-        let doubt = if self.unsettled_us > 0 {
-            changed.saturating_add(UNSETTLED_URPS)
-        } else {
-            changed
-        };
+        let now = asked(picture.lane.e_y_mm, picture.lane.e_theta_urad);
+        let later = now.saturating_add((asked(e_y_mmps, e_theta_urps) / 1000).saturating_mul(unseen_ms));
+        let mut doubt = unseen_ms
+            .saturating_sub(FRESH_MS)
+            .max(0)
+            .saturating_mul(YAW_ACCELERATION);
+        if self.unsettled_us > 0 {
+            doubt = doubt.saturating_add(UNSETTLED_URPS);
+        }
         let path = |turning: i32| times(self.lohs, turning.saturating_add(self.rate_urps), 16);
         let sideways = times(self.aligning, self.speed, 8);
         let torque = |urps: i32| times(sideways, urps, 20);
@@ -132,8 +146,8 @@ impl Fdca {
 }
 
 /// From where to where the rate of turn may be, urad/s.
-fn range_of_turning(evidence: &Evidence<'_>, turning_gain: i32) -> (i32, i32) {
-    let (vehicle, column) = (evidence.newest.vehicle, evidence.newest.column);
+fn range_of_turning(turning_gain: i32, evidence: &Evidence<'_>) -> (i32, i32) {
+    let Newest { vehicle, column } = evidence.newest;
     // 0.01 deg are 174.53 urad, 2^-12 rad/s are 15625/64 urad/s.
     let wheel_urad = field(column, 30, 18).saturating_mul(11_170) / 64;
     let by_wheel = times(turning_gain, wheel_urad, 16);
