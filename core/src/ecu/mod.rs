@@ -24,9 +24,9 @@ use crate::safety::actuator::Motor;
 use crate::safety::envelope::LimitReason;
 use crate::safety::faults::{Fault, FaultHistory, FaultSet};
 use crate::safety::modes::Mode;
-use crate::safety::monitor::{Evidence, Fdca, Monitor, MonitorState, Newest};
+use crate::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState, New};
 use crate::safety::redundant::{Redundant, words};
-use receivers::{Accepted, Receivers};
+use receivers::Receivers;
 
 /// How the ECU came up: what the firmware knows before the first step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -227,14 +227,10 @@ impl Ecu {
         command.torque = Guidance::rounded(command.torque);
         let mut guidance = self.guidance(&command, steps);
 
-        let Receivers { accepted, newest, .. } = &self.receivers;
         let evidence = Evidence {
-            lane: accepted.lane.as_ref(),
-            column: accepted.column.then_some(&newest.column),
-            request: accepted.request.as_ref(),
+            frames: &self.receivers.frames,
             guidance: guidance.bytes(),
             elapsed_us,
-            newest,
         };
         let v = self.memory.value_mut();
         let permitted = permits(monitor, &mut v.monitor, &mut self.fdca, &evidence, injection);
@@ -245,9 +241,9 @@ impl Ecu {
             at: now,
             count: steps.wrapping_add(1),
         };
-        seal(&mut self.memory, evidence.lane.is_some());
+        seal(&mut self.memory, self.receivers.frames.new.lane);
         // Each accepted frame is shown to the monitor once.
-        self.receivers.accepted = Accepted::NONE;
+        self.receivers.frames.new = New::default();
         if !permitted {
             command = Command {
                 torque: Torque::ZERO,
@@ -411,12 +407,9 @@ fn passes_self_test<I: Injection>(
     monitor.is_none_or(|monitor| {
         let (mut state, guidance) = monitor.self_test_vector(turn);
         let evidence = Evidence {
-            lane: None,
-            column: None,
-            request: None,
+            frames: &Frames::NONE,
             guidance: &guidance,
             elapsed_us: 1000,
-            newest: &Newest::default(),
         };
         !permits(Some(monitor), &mut state, fdca, &evidence, injection)
     })

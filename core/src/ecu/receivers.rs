@@ -11,7 +11,7 @@ use crate::law::LaneSample;
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
 use crate::safety::actuator::Actuator;
 use crate::safety::faults::Fault;
-use crate::safety::monitor::Newest;
+use crate::safety::monitor::Frames;
 use crate::safety::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
 use crate::safety::redundant::{Redundant, Words};
 
@@ -237,23 +237,6 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
     is_short.then_some(followed)
 }
 
-/// Bytes of the frames accepted since the last step: the monitor decodes them by itself.
-#[derive(Debug, Clone)]
-pub(super) struct Accepted {
-    pub(super) lane: Option<[u8; 8]>,
-    /// Its bytes are the newest.
-    pub(super) column: bool,
-    pub(super) request: Option<[u8; 8]>,
-}
-
-impl Accepted {
-    pub(super) const NONE: Self = Self {
-        lane: None,
-        column: false,
-        request: None,
-    };
-}
-
 /// A [`Request`], its flags in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
@@ -298,8 +281,8 @@ pub(super) struct Receivers {
     pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
-    pub(super) accepted: Accepted,
-    pub(super) newest: Newest,
+    /// What the monitor decodes by itself.
+    pub(super) frames: Frames,
     /// Steps for which a frame under an identifier of this ECU is still a fault. Not kept twice: a flip raises the fault
     /// for a while, or ends it early.
     foreign: u32,
@@ -346,8 +329,7 @@ impl Receivers {
             motion: Slot::redundant(e2e, Motion::default(), now),
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
-            accepted: Accepted::NONE,
-            newest: Newest::default(),
+            frames: Frames::NONE,
             foreign: 0,
             standing: Standing {
                 at_most: Speed::ZERO,
@@ -360,8 +342,7 @@ impl Receivers {
     pub(super) fn receive(&mut self, frame: &Frame, now: Instant) -> Option<Result<(), Reject>> {
         let Self {
             actuator,
-            accepted,
-            newest,
+            frames,
             standing,
             ..
         } = self;
@@ -370,7 +351,7 @@ impl Receivers {
                 let preview = LanePreview::decode(&mut slot.e2e, frame)?;
                 take_preview(slot, &preview, now)?;
                 if preview.valid {
-                    accepted.lane = Some(*frame.bytes());
+                    (frames.new.lane, frames.lane) = (true, *frame.bytes());
                 }
                 Ok(())
             }),
@@ -382,7 +363,7 @@ impl Receivers {
                 };
                 slot.put(column, now, COLUMN_PERIOD);
                 actuator.deliver(c.motor_torque);
-                (accepted.column, newest.column) = (true, *frame.bytes());
+                (frames.new.column, frames.column) = (true, *frame.bytes());
                 Ok(())
             }),
             Vehicle::ID => {
@@ -391,7 +372,7 @@ impl Receivers {
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
-                    newest.vehicle = *frame.bytes();
+                    frames.vehicle = *frame.bytes();
                     Ok(())
                 });
                 if heard != Some(Ok(())) {
@@ -407,7 +388,7 @@ impl Receivers {
                     authority: request.authority,
                 };
                 slot.put(request, now, REQUEST_PERIOD);
-                accepted.request = Some(*frame.bytes());
+                (frames.new.request, frames.request) = (true, *frame.bytes());
                 Ok(())
             }),
             // A node does not receive its own frames: another one sends in this ECU's name.

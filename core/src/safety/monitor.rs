@@ -18,7 +18,7 @@
 mod fdca;
 
 use crate::safety::redundant::{Redundant, words};
-pub use fdca::{Fdca, Newest};
+pub use fdca::Fdca;
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -85,21 +85,57 @@ words! {
     }
 }
 
+/// Bytes of the newest frames in use, and which came since the last step. Not kept twice: a flipped bit lasts until the next frame, for
+/// less than the time for which a torque may be astray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frames {
+    /// Lane preview.
+    pub lane: [u8; 8],
+    /// Column.
+    pub column: [u8; 8],
+    /// Request.
+    pub request: [u8; 8],
+    /// Vehicle.
+    pub vehicle: [u8; 8],
+    /// Which of them are new.
+    pub new: New,
+}
+
+/// Which frames are new; the vehicle's is only ever looked up.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct New {
+    /// Lane preview.
+    pub lane: bool,
+    /// Column.
+    pub column: bool,
+    /// Request.
+    pub request: bool,
+}
+
+impl Frames {
+    /// None came.
+    pub const NONE: Self = Self {
+        lane: [0; 8],
+        column: [0; 8],
+        request: [0; 8],
+        vehicle: [0; 8],
+        new: New {
+            lane: false,
+            column: false,
+            request: false,
+        },
+    };
+}
+
 /// What the monitor is shown every millisecond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Evidence<'a> {
-    /// Bytes of the latest lane preview frame in use, if a new one arrived.
-    pub lane: Option<&'a [u8; 8]>,
-    /// Bytes of the latest column frame in use, if a new one arrived.
-    pub column: Option<&'a [u8; 8]>,
-    /// Bytes of the latest request frame in use, if a new one arrived.
-    pub request: Option<&'a [u8; 8]>,
+    /// Frames that arrived.
+    pub frames: &'a Frames,
     /// Bytes of the guidance frame about to leave.
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
     pub elapsed_us: u32,
-    /// Frames that may have been shown before.
-    pub newest: &'a Newest,
 }
 
 /// Modes as the frame codes them; the last with torque is Handover.
@@ -360,10 +396,9 @@ impl MonitorState {
         let mut newer = None;
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
         let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
-        let lane = evidence
-            .lane
-            .filter(|_| unseen_us <= UNSEEN_US || !says_aside(evidence.guidance));
-        if let Some(bytes) = lane {
+        let frames = evidence.frames;
+        if frames.new.lane && (unseen_us <= UNSEEN_US || !says_aside(evidence.guidance)) {
+            let bytes = &frames.lane;
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
@@ -383,11 +418,11 @@ impl MonitorState {
             }
             (self.lane_state.lane, self.lane_state.came_us, self.step.age_us) = (new, age_us, age_us);
         }
-        if let Some(bytes) = evidence.column {
-            self.step.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
+        if frames.new.column {
+            self.step.driver_mnm = field(&frames.column, 12, 18).saturating_mul(1000) / 4096;
         }
         self.step.probe_left_us = self.step.probe_left_us.saturating_sub(elapsed_us).max(0);
-        if evidence.request.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
+        if frames.new.request && field(&frames.request, 21, 1) != 0 {
             self.step.probe_left_us = PROBE_END_US;
         }
         newer

@@ -42,16 +42,6 @@ words! {
     }
 }
 
-/// Bytes of the newest frames in use. Not kept twice: a flipped bit lasts until the next frame, for less than the time for which a torque
-/// may be astray.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Newest {
-    /// Of the vehicle.
-    pub vehicle: [u8; 8],
-    /// Of the column.
-    pub column: [u8; 8],
-}
-
 /// Two speeds further apart than this are not both right: 2 m/s.
 const SPREAD: i32 = 512;
 /// By how much wheel angle and speed may be wrong about the rate of turn for long: a bank of 8 %, 1.5 deg of the wheel.
@@ -80,7 +70,7 @@ impl Fdca {
         };
         self.filter(state.lane_state.lane.e_theta_urad, apart_us);
         self.apart_us = apart_us;
-        let turning_gain = self.turning_gain(&evidence.newest.vehicle);
+        let turning_gain = self.turning_gain(&evidence.frames.vehicle);
         let turning = range_of_turning(turning_gain, evidence);
         self.range(state, turning_gain, turning)
     }
@@ -147,7 +137,7 @@ impl Fdca {
 
 /// From where to where the rate of turn may be, urad/s.
 fn range_of_turning(turning_gain: i32, evidence: &Evidence<'_>) -> (i32, i32) {
-    let Newest { vehicle, column } = evidence.newest;
+    let (vehicle, column) = (&evidence.frames.vehicle, &evidence.frames.column);
     // 0.01 deg are 174.53 urad, 2^-12 rad/s are 15625/64 urad/s.
     let wheel_urad = field(column, 30, 18).saturating_mul(11_170) / 64;
     let by_wheel = times(turning_gain, wheel_urad, 16);
