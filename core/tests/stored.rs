@@ -45,9 +45,9 @@ fn block(version: u32, sequence: u32, values: &[f64]) -> Vec<u8> {
 }
 
 /// A different value in each field.
-const VALUES: [f64; 24] = [
+const VALUES: [f64; 27] = [
     0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.1, 2.0, 0.2, 1.5, 0.75, 0.25, 0.02, 0.001, 1.25,
-    0.5, 0.75, 0.375, 1.0, 0.625,
+    0.5, 0.75, 0.375, 1.0, 0.625, 0.875, 3.5, 1.25,
 ];
 
 fn params() -> Params {
@@ -78,6 +78,9 @@ fn params() -> Params {
         },
         law: 1.0,
         activity_lambda_min: 0.625,
+        fdca_k_y_rad_per_m: 0.875,
+        fdca_k_psi: 3.5,
+        fdca_lohs: 1.25,
     }
 }
 
@@ -94,7 +97,7 @@ fn the_layout_is_the_documented_one() {
     assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
     let bytes = save(&params(), 0x0102_0304);
     assert_eq!(bytes.to_vec(), block(3, 0x0102_0304, &VALUES));
-    assert_eq!(bytes.len(), 212);
+    assert_eq!(bytes.len(), 236);
     assert_eq!(load([&bytes, &[]]), found(params(), 0x0102_0304, 0));
 }
 

@@ -21,7 +21,7 @@ extern "C" {
 #define HG_ECU_ALIGN 8
 
 /* Number of parameters; hg_parameter numbers them. */
-#define HG_PARAMETERS 24
+#define HG_PARAMETERS 27
 
 /* Torque of one count of hg_step.torque_raw: 2^-12 N.m, as on the bus. */
 #define HG_TORQUE_LSB_NM (1.0 / 4096.0)

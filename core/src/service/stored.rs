@@ -6,8 +6,8 @@
 //! | 4..8 | sequence number, u32; the newer of two good copies counts, across a wrap |
 //! | 8..12 | the number of the processor that wrote it, u32 |
 //! | 12..16 | the number of the vehicle that it is for, u32; 0: nobody said |
-//! | 16..208 | the parameters in the order of [`PARAMETERS`], SI, f64 |
-//! | 208..212 | CRC-32 (ISO-HDLC, as in zlib) of all before |
+//! | 16..232 | the parameters in the order of [`PARAMETERS`], SI, f64 |
+//! | 232..236 | CRC-32 (ISO-HDLC, as in zlib) of all before |
 //!
 //! All little-endian. Who writes puts the next sequence number into the copy that was *not* loaded, so that a
 //! write that power cuts short leaves the previous set in use. Not here: the memory itself, and what to do

@@ -1,10 +1,11 @@
 //! The law that ships on the ECU beside the paper's, in fixed point, against that of `haptic_sim::laws` in f64; and that nothing
 //! honest makes the monitor refuse it.
 
-use haptic_core::controller::params::{DRIVER_ACTIVITY, Params};
+use haptic_core::controller::params::{DRIVER_ACTIVITY, FDCA, Params};
 use haptic_core::safety::faults::Fault;
 use haptic_sim::guidance::{OverBus, OwnLaw};
-use haptic_sim::laws::{Gains, Law, LawView};
+use haptic_sim::kind::Make;
+use haptic_sim::laws::{Gains, LAWS, Law, LawView};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::sensors::camera_looks;
@@ -27,6 +28,17 @@ fn scenario(controller: Params, kmh: f64, errors: SensorErrors, seed: u64) -> Sc
 const ACTIVITY: Params = Params {
     law: DRIVER_ACTIVITY,
     ..Params::PAPER
+};
+
+const BY_FDCA: Params = Params {
+    law: FDCA,
+    ..Params::PAPER
+};
+
+/// As the comparison tunes it.
+const TUNED_FDCA: Params = Params {
+    fdca_lohs: 0.4,
+    ..BY_FDCA
 };
 
 /// The filtered rate of the wheel in f64.
@@ -136,6 +148,36 @@ fn the_law_on_the_ecu_is_that_in_f64() {
     }
 }
 
+#[test]
+fn fdca_on_the_ecu_is_that_in_f64() {
+    for kmh in [60.0, 90.0] {
+        let shipping = scenario(BY_FDCA, kmh, SensorErrors::default(), 3);
+        let paper = scenario(Params::PAPER, kmh, SensorErrors::default(), 3);
+        let kind = LAWS.iter().find(|kind| kind.name == "fdca").unwrap();
+        let values: Vec<f64> = kind
+            .parameters
+            .iter()
+            .map(|parameter| parameter.default)
+            .collect();
+        let Make::Part(make) = kind.make else {
+            panic!("FDCA is a part")
+        };
+        let own = Simulation::with(&paper, OwnLaw::new(&paper, make(&paper, &values))).run();
+        let ecu = Simulation::with(&shipping, OverBus::new(shipping.setup())).run();
+        let pairs = || own.trace.samples.iter().zip(&ecu.trace.samples);
+        let most = |of: fn(&haptic_log::trace::Sample) -> f64| {
+            pairs().map(|(a, b)| (of(a) - of(b)).abs()).fold(0.0, f64::max)
+        };
+        let [torque, error] = [most(|s| s.guidance_torque_nm), most(|s| s.lateral_error_m)];
+        println!(
+            "FDCA, {kmh} km/h: {:.1} mN.m, {:.2} mm",
+            torque * 1e3,
+            error * 1e3
+        );
+        assert!(torque < 0.1 && error < 3e-3, "{kmh}: {torque} {error}");
+    }
+}
+
 /// Each is driven for the whole course; the monitor's verdict would latch.
 #[test]
 fn the_monitor_refuses_no_honest_law() {
@@ -188,7 +230,7 @@ fn the_monitor_refuses_no_honest_law() {
         ),
     ];
     let mut refused = Vec::new();
-    for params in [ACTIVITY] {
+    for params in [ACTIVITY, BY_FDCA, TUNED_FDCA] {
         for (what, errors) in cases {
             for kmh in [40.0, 60.0, 100.0] {
                 let scenario = scenario(params, kmh, errors, 5);

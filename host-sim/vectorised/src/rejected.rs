@@ -260,8 +260,11 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
                 near_time_s: _,
             },
         law: _,
-        // Without its law it does not act.
+        // Without their laws they do not act.
         activity_lambda_min: _,
+        fdca_k_y_rad_per_m: _,
+        fdca_k_psi: _,
+        fdca_lohs: _,
     } = controller;
     controller
 }
