@@ -156,9 +156,9 @@ fn a_write_over_the_oldest_copy_cut_short_at_any_byte() {
 
 #[test]
 fn other_versions_and_values_out_of_range_are_no_good() {
-    assert_eq!(load([&block(1, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(3, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(2, 1, &VALUES[..21]), &[]]), None);
+    assert_eq!(load([&block(2, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(4, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(3, 1, &VALUES[..26]), &[]]), None);
     let ranges_end = [
         (0, 4.1),
         (5, 0.4),

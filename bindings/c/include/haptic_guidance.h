@@ -85,7 +85,10 @@ typedef enum hg_parameter {
     HG_VEHICLE_FAR_TIME_S = 20,
     HG_VEHICLE_NEAR_TIME_S = 21,
     HG_LAW = 22,
-    HG_ACTIVITY_LAMBDA_MIN = 23
+    HG_ACTIVITY_LAMBDA_MIN = 23,
+    HG_FDCA_K_Y_RAD_PER_M = 24,
+    HG_FDCA_K_PSI = 25,
+    HG_FDCA_LOHS = 26
 } hg_parameter;
 
 /* A classic CAN data frame. */

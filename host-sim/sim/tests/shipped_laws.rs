@@ -162,7 +162,7 @@ fn fdca_on_the_ecu_is_that_in_f64() {
         let Make::Part(make) = kind.make else {
             panic!("FDCA is a part")
         };
-        let own = Simulation::with(&paper, OwnLaw::new(&paper, make(&paper, &values))).run();
+        let own = Simulation::with(&paper, OwnLaw::new(&paper, make(&paper, &values).unwrap())).run();
         let ecu = Simulation::with(&shipping, OverBus::new(shipping.setup())).run();
         let pairs = || own.trace.samples.iter().zip(&ecu.trace.samples);
         let most = |of: fn(&haptic_log::trace::Sample) -> f64| {
