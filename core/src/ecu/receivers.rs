@@ -370,9 +370,9 @@ impl Receivers {
                 let heard = self.motion.change(|slot| {
                     let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
+                    frames.vehicle = *frame.bytes();
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
-                    frames.vehicle = *frame.bytes();
                     Ok(())
                 });
                 if heard != Some(Ok(())) {
