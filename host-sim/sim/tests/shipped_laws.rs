@@ -1,9 +1,10 @@
 //! The law that ships on the ECU beside the paper's, in fixed point, against that of `haptic_sim::laws` in f64; and that nothing
 //! honest makes the monitor refuse it.
 
+use haptic_core::bus::Frame;
 use haptic_core::controller::params::{DRIVER_ACTIVITY, Params};
 use haptic_core::safety::faults::Fault;
-use haptic_sim::guidance::{OverBus, OwnLaw};
+use haptic_sim::guidance::{Actuation, Guidance, Observation, OverBus, OwnLaw, Status};
 use haptic_sim::laws::{Gains, Law, LawView};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::DriverParameters;
@@ -64,6 +65,23 @@ struct Sampled {
 }
 
 impl Sampled {
+    const fn new(least: f64) -> Self {
+        Self {
+            paper: Gains::PAPER,
+            least,
+            column: [0.0; 2],
+            column_step: 0,
+            looked: 0,
+            is_due: false,
+            rate: Rate {
+                last: (0.0, 0.0),
+                rate: 0.0,
+            },
+            sums: [0.0; 2],
+            share: 1.0,
+        }
+    }
+
     fn look(&mut self, guidance_torque_nm: f64) {
         let [driver_torque_nm, wheel_angle_rad] = self.column;
         let at_s = f64::from(self.column_step) * 1e-3;
@@ -98,41 +116,79 @@ impl Law for Sampled {
     }
 }
 
-/// The same drive twice: the ECU with its own law, and the same ECU with the law in f64 in its place. The largest differences of torque
-/// and lateral error.
-fn apart(params: Params, kmh: f64) -> [f64; 2] {
-    let shipping = scenario(params, kmh, SensorErrors::default(), 3);
-    let paper = scenario(Params::PAPER, kmh, SensorErrors::default(), 3);
-    let law = Sampled {
-        paper: Gains::PAPER,
-        least: params.activity_lambda_min,
-        column: [0.0; 2],
-        column_step: 0,
-        looked: 0,
-        is_due: false,
-        rate: Rate {
-            last: (0.0, 0.0),
-            rate: 0.0,
-        },
-        sums: [0.0; 2],
-        share: 1.0,
-    };
-    let own = Simulation::with(&paper, OwnLaw::new(&paper, law)).run();
-    let ecu = Simulation::with(&shipping, OverBus::new(shipping.setup())).run();
-    assert_eq!(own.trace.samples.len(), ecu.trace.samples.len());
-    let pairs = || own.trace.samples.iter().zip(&ecu.trace.samples);
-    let most = |of: fn(&haptic_log::trace::Sample) -> f64| {
-        pairs().map(|(a, b)| (of(a) - of(b)).abs()).fold(0.0, f64::max)
-    };
-    [most(|s| s.guidance_torque_nm), most(|s| s.lateral_error_m)]
+/// The ECU drives; the law in f64, behind an ECU of its own, is given the same sensors beside it. In two drives a last digit would in time
+/// round one reading of the wheel angle, 0.1 deg, to the other side, and the drives would differ by what follows from that.
+#[derive(Clone)]
+struct Beside {
+    ecu: OverBus,
+    in_f64: OwnLaw<Sampled>,
+    /// The largest difference of torque, N.m, and when.
+    most: (f64, f64),
+    /// The most that (9) asks for, N.m.
+    paper_nm: f64,
+    least_share: f64,
 }
+
+impl Guidance for Beside {
+    fn looks_at_road(&self, step: u32) -> bool {
+        self.ecu.looks_at_road(step)
+    }
+
+    fn step(&mut self, observation: &Observation) -> Actuation {
+        let actuation = self.ecu.step(observation);
+        let apart_nm = (self.in_f64.step(observation).torque_nm - actuation.torque_nm).abs();
+        if apart_nm > self.most.0 {
+            self.most = (apart_nm, f64::from(observation.step) * 1e-3);
+        }
+        let share = self.in_f64.law().share;
+        self.paper_nm = self.paper_nm.max((self.in_f64.demanded_nm() / share).abs());
+        self.least_share = self.least_share.min(share);
+        actuation
+    }
+
+    fn status(&self) -> Option<Status> {
+        self.ecu.status()
+    }
+
+    fn frames_in(&self) -> &[Frame] {
+        self.ecu.frames_in()
+    }
+
+    fn frames_out(&self) -> &[Frame] {
+        self.ecu.frames_out()
+    }
+}
+
+/// What the torques of the two may differ by: the error of (9) in fixed point, that of the share times what (9) asks for
+/// (both as documented, `core/tests` asserts them), and an LSB of the bus, as each is rounded to one.
+const OF_PAPER_NM: f64 = 0.2e-3;
+const OF_SHARE: f64 = 1e-3;
+const ROUNDED_NM: f64 = 1.0 / 4096.0;
 
 #[test]
 fn the_law_on_the_ecu_is_that_in_f64() {
     for kmh in [60.0, 90.0] {
-        let [torque, error] = apart(ACTIVITY, kmh);
-        println!("{kmh} km/h: {:.1} mN.m, {:.2} mm", torque * 1e3, error * 1e3);
-        assert!(torque < 0.03 && error < 3e-3, "{kmh}: {torque} {error}");
+        let shipping = scenario(ACTIVITY, kmh, SensorErrors::default(), 3);
+        let paper = scenario(Params::PAPER, kmh, SensorErrors::default(), 3);
+        let beside = Beside {
+            ecu: OverBus::new(shipping.setup()),
+            in_f64: OwnLaw::new(&paper, Sampled::new(ACTIVITY.activity_lambda_min)),
+            most: (0.0, 0.0),
+            paper_nm: 0.0,
+            least_share: 1.0,
+        };
+        let mut simulation = Simulation::with(&shipping, beside);
+        while simulation.step(&Action::default()).is_some() {}
+        let beside = simulation.guidance();
+        let (apart_nm, at_s) = beside.most;
+        let allowed_nm = OF_PAPER_NM + OF_SHARE * beside.paper_nm + ROUNDED_NM;
+        println!(
+            "{kmh} km/h: {:.2} of {:.2} mN.m at {at_s} s",
+            apart_nm * 1e3,
+            allowed_nm * 1e3
+        );
+        assert!(apart_nm < allowed_nm, "{kmh} km/h: {apart_nm} N.m at {at_s} s");
+        assert!(beside.least_share < 0.35, "{kmh} km/h: {}", beside.least_share);
     }
 }
 
