@@ -145,7 +145,7 @@ pub(crate) fn check(scope: Scope, built: Built, bless: bool) -> Result<()> {
             );
         }
     }
-    for figure in figures.iter().filter(|figure| figure.name.ends_with(" step")) {
+    for figure in figures.iter().filter(|figure| figure.unit == "instructions") {
         println!(
             "{}: {} instructions, {:.1} % of a tick at {} MHz and {CYCLES_PER_INSTRUCTION} cycles each",
             figure.name,
