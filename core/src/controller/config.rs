@@ -70,6 +70,13 @@ impl Config {
     /// # Errors
     /// The first that is not a number within its range.
     pub const fn new(p: &Params) -> Result<Self, ParamError> {
+        match Self::check(p) {
+            Ok(()) => Ok(Self::from_params(p)),
+            Err(error) => Err(error),
+        }
+    }
+
+    const fn check(p: &Params) -> Result<(), ParamError> {
         if let Err(error) = p.check() {
             return Err(error);
         }
@@ -98,7 +105,7 @@ impl Config {
             }
             i += 1;
         }
-        Ok(Self::from_params(p))
+        Ok(())
     }
 
     /// The configuration of parameters that are in range.
@@ -184,20 +191,28 @@ impl Setup {
     /// # Errors
     /// The first parameter that is not a number within its range.
     pub const fn new(p: &Params) -> Result<Self, ParamError> {
-        let config = match Config::new(p) {
-            Ok(config) => config,
-            Err(error) => return Err(error),
-        };
-        // Gains that an honest law may use and the monitor cannot follow contradict each other.
-        match in_range(BAND, monitor_band_nm(p), [LEAST_BAND_NM, MOST_BAND_NM], "N.m") {
+        match Self::check(p) {
             Ok(()) => Ok(Self {
-                config,
+                config: Config::from_params(p),
                 monitor: Monitor::new(p),
                 fdca: Fdca::new(p),
                 estimator: Estimator::new(p),
             }),
             Err(error) => Err(error),
         }
+    }
+
+    /// The same without a setup, which takes a tenth of the stack.
+    ///
+    /// # Errors
+    /// As those of [`Setup::new`].
+    #[inline(never)]
+    pub const fn check(p: &Params) -> Result<(), ParamError> {
+        if let Err(error) = Config::check(p) {
+            return Err(error);
+        }
+        // Gains that an honest law may use and the monitor cannot follow contradict each other.
+        in_range(BAND, monitor_band_nm(p), [LEAST_BAND_NM, MOST_BAND_NM], "N.m")
     }
 }
 

@@ -92,5 +92,5 @@ fn read(bytes: &[u8], hardware: u32) -> Option<(u32, Set)> {
         *si = f64::from_le_bytes(*bytes);
     }
     let params = Params::from_values(&si);
-    (is_whole && is_ours && Setup::new(&params).is_ok()).then_some((sequence, Set { params, vehicle }))
+    (is_whole && is_ours && Setup::check(&params).is_ok()).then_some((sequence, Set { params, vehicle }))
 }
