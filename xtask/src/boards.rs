@@ -19,7 +19,7 @@ use crate::tool::{self, Built, Usage, cargo, run};
 /// Length of the guard below the stack (`firmware/src/stack.rs`): a larger frame could step over it.
 const GUARD: u64 = 4096;
 /// The stack's budget (`firmware/src/stack.x`).
-const STACK: u64 = 8192;
+const STACK: u64 = 12_288;
 
 /// The clock of an STM32G4, and what an instruction takes there at most in the mean (docs/porting.md).
 const CLOCK_MHZ: u64 = 170;
