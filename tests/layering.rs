@@ -16,14 +16,16 @@ type Arrows = &'static [(&'static str, &'static [&'static str])];
 const CORE: Arrows = &[
     // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
     ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
-    ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
-    ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
+    ("controller::config", &["controller::params", "estimator", "law", "law::activity", "law::fdca", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("controller::injection", &["quantity"]),
     ("controller::inputs", &["law", "quantity", "safety::faults", "safety::redundant"]),
-    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp"]),
+    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "law", "law::activity", "law::fdca", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp"]),
     ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "law", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("estimator", &["bus", "law::sine", "quantity"]),
     ("law", &["quantity", "safety::redundant"]),
+    ("law::activity", &["law", "quantity", "safety::redundant"]),
+    ("law::fdca", &["law", "quantity"]),
     ("law::probe", &["law::sine", "quantity", "safety::redundant"]),
     ("law::schedule", &["quantity", "safety::redundant"]),
     ("quantity", &["safety::redundant"]),
@@ -37,7 +39,7 @@ const CORE: Arrows = &[
     ("safety::monitor", &["safety::redundant"]),
     ("safety::motion_history", &["quantity"]),
     // The law's input, and where the vehicle and its line were.
-    ("safety::plausibility", &["law", "quantity", "safety::motion_history", "safety::redundant", "safety::yaw"]),
+    ("safety::plausibility", &["law", "law::activity", "quantity", "safety::motion_history", "safety::redundant", "safety::yaw"]),
     ("safety::ramp", &["quantity", "safety::redundant"]),
     ("safety::yaw", &["quantity", "safety::redundant"]),
     ("service::download", &["bus", "controller::config", "controller::params", "safety::faults", "safety::modes", "service::stored"]),

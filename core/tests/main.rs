@@ -19,6 +19,7 @@ mod frozen_torque;
 mod fuzz;
 mod hands;
 mod law_oracle;
+mod laws;
 mod long_message;
 mod memory;
 mod modes;

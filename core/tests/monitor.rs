@@ -2,7 +2,8 @@
 
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
-use haptic_core::safety::monitor::{Evidence, Monitor, MonitorState, RULES};
+use haptic_core::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState, New, RULES};
+use haptic_core::safety::redundant::Redundant;
 
 const STANDBY: u64 = 1;
 const ACTIVE: u64 = 2;
@@ -38,6 +39,11 @@ fn monitor(limit_nm: f64) -> Monitor {
     Setup::new(&params).unwrap().monitor
 }
 
+/// Equation (9) has no use for it.
+fn unused() -> Redundant<Fdca> {
+    Redundant::new(Fdca::new(&Params::PAPER))
+}
+
 /// A monitor with what it remembers.
 #[derive(Clone, Copy)]
 struct Bench {
@@ -54,14 +60,22 @@ impl Bench {
     }
 
     fn show(&mut self, lane: Option<[u8; 8]>, column: Option<[u8; 8]>, frame: [u8; 8], us: u32) -> bool {
+        let frames = Frames {
+            lane: lane.unwrap_or_default(),
+            column: column.unwrap_or_default(),
+            new: New {
+                lane: lane.is_some(),
+                column: column.is_some(),
+                request: false,
+            },
+            ..Frames::NONE
+        };
         let evidence = Evidence {
-            lane: lane.as_ref(),
-            column: column.as_ref(),
-            request: None,
+            frames: &frames,
             guidance: &frame,
             elapsed_us: us,
         };
-        self.monitor.step(&mut self.state, &evidence)
+        self.monitor.step(&mut self.state, &mut unused(), &evidence)
     }
 
     fn torque(&mut self, torque: i64, mode: u64) -> bool {
@@ -592,14 +606,22 @@ fn times_are_those_of_the_clock_whatever_a_step_takes() {
         let mut bench = Bench::at(5.0, torque);
         let request = (1_u64 << 21).to_le_bytes();
         let mut asks = |is_asked: bool| {
+            let frames = Frames {
+                lane: lane(0, 0, 0),
+                request,
+                new: New {
+                    lane: true,
+                    column: false,
+                    request: is_asked,
+                },
+                ..Frames::NONE
+            };
             let evidence = Evidence {
-                lane: Some(&lane(0, 0, 0)),
-                column: None,
-                request: is_asked.then_some(&request),
+                frames: &frames,
                 guidance: &guidance(torque, ACTIVE),
                 elapsed_us: us,
             };
-            bench.monitor.step(&mut bench.state, &evidence)
+            bench.monitor.step(&mut bench.state, &mut unused(), &evidence)
         };
         assert!((0..50).all(|_| asks(true)));
         let steps = (0..3000).take_while(|_| asks(false)).count() as u32;

@@ -55,6 +55,25 @@ fn a_product_out_of_range_is_named() {
 }
 
 #[test]
+fn a_law_that_there_is_not_is_refused() {
+    for (law, says) in [
+        (0.0, None),
+        (1.0, None),
+        (2.0, None),
+        (0.5, Some("law = 0.5 is outside [0, 2] in whole numbers")),
+        (3.0, Some("law = 3 is outside [0, 2] 1")),
+        (f64::NAN, Some("law = NaN is outside [0, 2] 1")),
+    ] {
+        let p = Params { law, ..Params::PAPER };
+        let error = Setup::new(&p)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+            .err();
+        assert_eq!(error.as_deref(), says, "{law}");
+    }
+}
+
+#[test]
 fn a_probe_too_steep_for_the_wind_up_limit_is_refused() {
     let with = |amplitude, frequency| {
         Config::new(&Params {

@@ -13,7 +13,8 @@ use haptic_core::quantity::{Radians, Ratio, Torque};
 use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::FaultSet;
 use haptic_core::safety::modes::Mode;
-use haptic_core::safety::monitor::{Evidence, Monitor, MonitorState};
+use haptic_core::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState, New};
+use haptic_core::safety::redundant::Redundant;
 
 /// Half an LSB of the torque on the bus, and the arithmetic of the core.
 const ROUNDING: f64 = 0.5 / 4096.0 + 1e-5;
@@ -173,15 +174,14 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
         let elapsed_us = 1_000;
         (0..5_000).find(|ms| {
             let request = request(*ms < until);
+            let frames = with_lane(lane, request, ms.is_multiple_of(10));
             let evidence = Evidence {
-                lane: Some(&lane),
-                column: None,
-                request: ms.is_multiple_of(10).then_some(&request),
+                frames: &frames,
                 guidance: &guidance,
                 elapsed_us,
             };
             let state_before = state;
-            let permitted = monitor.step(&mut state, &evidence);
+            let permitted = monitor.step(&mut state, &mut unused(), &evidence);
             // The first step grows too fast for the monitor; it is not what this is about.
             if *ms == 0 && !permitted {
                 state = grown(&monitor, state_before, &request);
@@ -194,6 +194,24 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
     assert!(ends(0).is_some_and(|ms| (20..=30).contains(&ms)), "{:?}", ends(0));
     let ended = ends(2_000).unwrap();
     assert!((3_020..=3_060).contains(&ended), "{ended}");
+}
+
+fn with_lane(lane: [u8; 8], request: [u8; 8], is_request_new: bool) -> Frames {
+    Frames {
+        lane,
+        request,
+        new: New {
+            lane: true,
+            column: false,
+            request: is_request_new,
+        },
+        ..Frames::NONE
+    }
+}
+
+/// Equation (9) has no use for it.
+fn unused() -> Redundant<Fdca> {
+    Redundant::new(Fdca::new(&haptic_core::controller::params::Params::PAPER))
 }
 
 /// Brings a monitor up to 0.45 N.m at its own pace on a lane error of 1 m, which asks for 0.5 N.m, with the probe asked
@@ -215,14 +233,13 @@ fn grown(monitor: &Monitor, mut state: MonitorState, request: &[u8; 8]) -> Monit
             reset: ResetCause::PowerOn,
         };
         let guidance = bytes(&guidance.encode(0));
+        let frames = with_lane(lane, *request, true);
         let evidence = Evidence {
-            lane: Some(&lane),
-            column: None,
-            request: Some(request),
+            frames: &frames,
             guidance: &guidance,
             elapsed_us: 1_000,
         };
-        assert!(monitor.step(&mut state, &evidence));
+        assert!(monitor.step(&mut state, &mut unused(), &evidence));
     }
     state
 }

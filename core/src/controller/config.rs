@@ -11,19 +11,24 @@
     reason = "parameters are SI values in f64, turned into bits at compile time or before the first step"
 )]
 
-use crate::controller::params::{ParamError, Params, in_range};
+mod monitor;
+
+use crate::controller::params::{DRIVER_ACTIVITY, FDCA, LAWS, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
+use crate::law::activity::{LeastShare, TimeAndShare};
+use crate::law::fdca::Choices;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
-    CurvaturePerAngle, Micros, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
-    TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+    AnglePerLength, CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::safety::envelope::Envelope;
-use crate::safety::monitor::Monitor;
+use crate::safety::monitor::{Fdca, Monitor};
 use crate::safety::plausibility::Plausibility;
 use crate::safety::redundant::words;
+use monitor::monitor_band_nm;
 
 words! {
     /// The checked configuration of every block of the controller.
@@ -65,8 +70,24 @@ impl Config {
     /// # Errors
     /// The first that is not a number within its range.
     pub const fn new(p: &Params) -> Result<Self, ParamError> {
+        match Self::check(p) {
+            Ok(()) => Ok(Self::from_params(p)),
+            Err(error) => Err(error),
+        }
+    }
+
+    const fn check(p: &Params) -> Result<(), ParamError> {
         if let Err(error) = p.check() {
             return Err(error);
+        }
+        if p.law != p.law as u32 as f64 {
+            return Err(ParamError {
+                name: "law",
+                value: p.law,
+                min: 0.0,
+                max: (LAWS.len() - 1) as f64,
+                unit: "in whole numbers",
+            });
         }
         let slope = 2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz;
         let gains = [0.0, MAX_GAIN];
@@ -84,19 +105,35 @@ impl Config {
             }
             i += 1;
         }
-        Ok(Self::from_params(p))
+        Ok(())
     }
 
     /// The configuration of parameters that are in range.
     const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
+        let tau = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
+        let between_us = (f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32;
+        let least_share = if p.law == DRIVER_ACTIVITY {
+            Some(LeastShare::from_si(p.activity_lambda_min))
+        } else {
+            None
+        };
         Self {
-            law: Law {
-                e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
-                e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
-                e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
-                e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
-                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
+            law: if p.law == FDCA {
+                let choices = Choices {
+                    k_y: AnglePerLength::from_rad_per_m(p.fdca_k_y_rad_per_m),
+                    k_psi: Ratio::from_si(p.fdca_k_psi),
+                    lohs: Ratio::from_si(p.fdca_lohs),
+                };
+                Law::of_choices(choices, tau)
+            } else {
+                Law {
+                    e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
+                    e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
+                    e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
+                    e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
+                    tau,
+                }
             },
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
@@ -110,7 +147,7 @@ impl Config {
                 column_damping: TorquePerTurningRate::from_nm_s_per_rad(v.column_damping_nm_s),
                 far_time: Seconds::from_s(v.far_time_s),
                 near_time: Seconds::from_s(v.near_time_s),
-                between: Micros::from_us((f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32),
+                between: TimeAndShare::new(Micros::from_us(between_us), least_share),
             },
             least_speed: Speed::from_m_per_s(p.least_speed_m_per_s),
             probe: Probe {
@@ -127,22 +164,6 @@ const fn phase_per_us(frequency_hz: f64) -> u32 {
     (frequency_hz * 4_294.967_296 + 0.5) as u32
 }
 
-/// Half the monitor's band, N.m: how far an honest law may be from the monitor's coarse one. Both take rates from the
-/// same samples, the law with its filter, the monitor over 50 to 60 ms, so that they differ by the change of a rate
-/// times the difference of their delays: the errors' second derivatives are up to 4 m/s2 and 1 rad/s2 on a road. Noise
-/// of 15 mm and 1.5 mrad, three times what a camera has, moves the law's rates by its share of a sample.
-const fn monitor_band_nm(p: &Params) -> f64 {
-    let tau_s = 1.0 / (2.0 * core::f64::consts::PI * p.rate_corner_hz);
-    let apart_s = f64::max(tau_s - 0.02, 0.06 - tau_s);
-    let noise_per_s = 1.5 / (tau_s + 1.0 / 120.0);
-    let a_rate = p.k_1 * p.a_2 * (4.0 * apart_s + 0.015 * noise_per_s);
-    let theta_rate = p.k_1 * p.a_4 * (apart_s + 0.001_5 * noise_per_s);
-    // A sample that is 30 ms old goes on at rates that differ by as much.
-    let ahead = 0.03 * p.k_1 * (p.a_1 * 4.0 + p.a_3) * apart_s;
-    let carried = 0.03 * p.k_1 * (p.a_1 * 1.5 + p.a_3 * 0.3);
-    f64::max(LEAST_BAND_NM, 2.0 * (a_rate + theta_rate + ahead) + carried)
-}
-
 /// Everything that parameters decide: the controller's configuration, the monitor's and the estimator's.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup {
@@ -150,6 +171,8 @@ pub struct Setup {
     pub config: Config,
     /// The monitor's own limits.
     pub monitor: Monitor,
+    /// The monitor's own FDCA.
+    pub fdca: Fdca,
     /// The estimator of K_hg.
     pub estimator: Estimator,
 }
@@ -159,6 +182,7 @@ impl Setup {
     pub const PAPER: Self = Self {
         config: Config::PAPER,
         monitor: Monitor::new(&Params::PAPER),
+        fdca: Fdca::new(&Params::PAPER),
         estimator: Estimator::new(&Params::PAPER),
     };
 
@@ -167,19 +191,28 @@ impl Setup {
     /// # Errors
     /// The first parameter that is not a number within its range.
     pub const fn new(p: &Params) -> Result<Self, ParamError> {
-        let config = match Config::new(p) {
-            Ok(config) => config,
-            Err(error) => return Err(error),
-        };
-        // Gains that an honest law may use and the monitor cannot follow contradict each other.
-        match in_range(BAND, monitor_band_nm(p), [LEAST_BAND_NM, MOST_BAND_NM], "N.m") {
+        match Self::check(p) {
             Ok(()) => Ok(Self {
-                config,
+                config: Config::from_params(p),
                 monitor: Monitor::new(p),
+                fdca: Fdca::new(p),
                 estimator: Estimator::new(p),
             }),
             Err(error) => Err(error),
         }
+    }
+
+    /// The same without a setup, which takes a tenth of the stack.
+    ///
+    /// # Errors
+    /// As those of [`Setup::new`].
+    #[inline(never)]
+    pub const fn check(p: &Params) -> Result<(), ParamError> {
+        if let Err(error) = Config::check(p) {
+            return Err(error);
+        }
+        // Gains that an honest law may use and the monitor cannot follow contradict each other.
+        in_range(BAND, monitor_band_nm(p), [LEAST_BAND_NM, MOST_BAND_NM], "N.m")
     }
 }
 
@@ -225,26 +258,6 @@ pub const fn arm_share(p: &Params) -> f64 {
     below.abs().max(above.abs()).max(between)
 }
 
-impl Monitor {
-    /// The monitor's own limits, straight from the SI parameters and past the configuration above.
-    #[must_use]
-    pub const fn new(p: &Params) -> Self {
-        Self {
-            limit_mnm: (p.torque_limit_nm * 1e3 + 0.5) as i32,
-            growth_mnm_per_ms: (p.wind_up_nm_per_s + 0.999) as i32,
-            fall_mnm_per_ms: (p.reduction_nm_per_s + 0.999) as i32,
-            band_mnm: (monitor_band_nm(p) * 1e3 + 0.5) as i32,
-            probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
-            gains_mnm: [
-                (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
-                (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,
-                (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
-                (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
-            ],
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -264,7 +277,7 @@ mod tests {
             };
             (params.vehicle.far_time_s, params.vehicle.near_time_s) = (far_time_s, near_time_s);
             let config = Config::new(&params).unwrap();
-            assert_eq!(config.plausibility.between, Micros::from_us(between_us));
+            assert_eq!(config.plausibility.between.time(), Micros::from_us(between_us));
             assert_eq!(config.law.tau, tau, "{rate_corner_hz}");
         }
     }

@@ -13,6 +13,7 @@ use crate::controller::config::Config;
 use crate::controller::injection::{Injection, NoInjection};
 use crate::controller::inputs::Inputs;
 use crate::law::LawState;
+use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
@@ -107,12 +108,24 @@ impl ChangedParts {
 
 /// Inputs whose newest sample is still to be checked. Not kept twice: a flipped bit skips one check, whose time the next one
 /// covers, or repeats one on the same sample, over no time.
-/// Beside them what the column's check alone knows of the driver torque.
-#[derive(Debug, Clone, Copy, Default)]
+/// Beside them what the column's check alone knows of the driver torque, and driver activity, which is bounded where it is read.
+#[derive(Debug, Clone, Copy)]
 struct PendingChecks {
     lane: bool,
     column: bool,
     frozen_torque: FrozenTorqueState,
+    activity: Activity,
+}
+
+impl PendingChecks {
+    fn new() -> Self {
+        Self {
+            lane: false,
+            column: false,
+            frozen_torque: FrozenTorqueState::default(),
+            activity: Activity::NEW,
+        }
+    }
 }
 
 /// Four bytes that share a word, as memory is compared word by word.
@@ -227,7 +240,7 @@ impl ControllerState {
             memory: Redundant::new(Memory::new(mode, now)),
             torque_history: TorqueHistory::new(),
             motion_history: MotionHistory::new(),
-            pending: PendingChecks::default(),
+            pending: PendingChecks::new(),
         }
     }
 
@@ -309,6 +322,7 @@ impl Controller {
             applied,
             inputs,
             lane: inputs.lane,
+            is_late: false,
             elapsed: now.since(memory.fast.last_step),
             injection,
         };

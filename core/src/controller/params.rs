@@ -36,7 +36,15 @@ pub struct Parameter {
     pub default: f64,
 }
 
-/// Declares the parameters: `field: unit, least to largest, default;`, and a group of those that belong together.
+/// The guidance laws that ship, in the order of the parameter `law`.
+pub const LAWS: [&str; 3] = ["paper", "driver_activity", "fdca"];
+/// [`Params::law`] of driver activity.
+pub const DRIVER_ACTIVITY: f64 = 1.0;
+/// [`Params::law`] of four design choices.
+pub const FDCA: f64 = 2.0;
+
+/// Declares the parameters: `field: unit, least to largest, default;`, a group of those that belong together, and more. New
+/// ones come last, so that none changes its number.
 macro_rules! parameters {
     (
         $(#[$doc:meta])* $Set:ident {
@@ -44,6 +52,7 @@ macro_rules! parameters {
             group $group:ident: $Group:ident, $group_doc:literal {
                 $($(#[doc = $g_meaning:literal])+ $g_field:ident: $g_unit:literal, $g_min:literal to $g_max:literal, $g_default:literal;)*
             }
+            $($(#[doc = $l_meaning:literal])+ $l_field:ident: $l_unit:literal, $l_min:literal to $l_max:literal, $l_default:literal;)*
         }
     ) => {
         $(#[$doc])*
@@ -52,6 +61,7 @@ macro_rules! parameters {
             $($(#[doc = $meaning])+ #[doc = concat!("\n\nUnit ", $unit, ", ", stringify!($min), " to ", stringify!($max), ".")] pub $field: f64,)*
             #[doc = $group_doc]
             pub $group: $Group,
+            $($(#[doc = $l_meaning])+ #[doc = concat!("\n\nUnit ", $l_unit, ", ", stringify!($l_min), " to ", stringify!($l_max), ".")] pub $l_field: f64,)*
         }
 
         #[doc = $group_doc]
@@ -61,7 +71,7 @@ macro_rules! parameters {
         }
 
         /// Every parameter, in the order of the bus and of the memory.
-        pub const PARAMETERS: [Parameter; [$(stringify!($field),)* $(stringify!($g_field),)*].len()] = [
+        pub const PARAMETERS: [Parameter; [$(stringify!($field),)* $(stringify!($g_field),)* $(stringify!($l_field),)*].len()] = [
             $(Parameter {
                 name: stringify!($field),
                 meaning: concat!($($meaning),+),
@@ -78,6 +88,14 @@ macro_rules! parameters {
                 max: $g_max,
                 default: $g_default,
             },)*
+            $(Parameter {
+                name: stringify!($l_field),
+                meaning: concat!($($l_meaning),+),
+                unit: $l_unit,
+                min: $l_min,
+                max: $l_max,
+                default: $l_default,
+            },)*
         ];
 
         impl $Set {
@@ -86,21 +104,23 @@ macro_rules! parameters {
             pub const PAPER: Self = Self {
                 $($field: $default,)*
                 $group: $Group { $($g_field: $g_default,)* },
+                $($l_field: $l_default,)*
             };
 
             /// The values in the order of [`PARAMETERS`].
             #[must_use]
             pub const fn to_values(&self) -> [f64; PARAMETERS.len()] {
-                [$(self.$field,)* $(self.$group.$g_field,)*]
+                [$(self.$field,)* $(self.$group.$g_field,)* $(self.$l_field,)*]
             }
 
             /// The set with these values, in the order of [`PARAMETERS`].
             #[must_use]
             pub const fn from_values(values: &[f64; PARAMETERS.len()]) -> Self {
-                let [$($field,)* $($g_field,)*] = *values;
+                let [$($field,)* $($g_field,)* $($l_field,)*] = *values;
                 Self {
                     $($field,)*
                     $group: $Group { $($g_field,)* },
+                    $($l_field,)*
                 }
             }
         }
@@ -159,6 +179,16 @@ parameters! {
             /// t'_n of it.
             near_time_s: "s", 0.0 to 5.0, 0.3;
         }
+        /// The guidance law: 0 is equation (9), 1 is driver activity, 2 is FDCA.
+        law: "1", 0.0 to 2.0, 0.0;
+        /// Least share of equation (9) that driver activity leaves to a driver who works against it.
+        activity_lambda_min: "1", 0.0 to 1.0, 0.3;
+        /// SoHF*k_y of FDCA, on e_y'.
+        fdca_k_y_rad_per_m: "rad/m", 0.0 to 10.0, 0.15;
+        /// SoHF*k_psi of FDCA, on e_theta'.
+        fdca_k_psi: "1", 0.0 to 50.0, 2.5;
+        /// LoHS of FDCA, level of haptic support: the share of the path's torque that it carries.
+        fdca_lohs: "1", 0.0 to 2.0, 1.0;
     }
 }
 

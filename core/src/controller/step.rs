@@ -5,6 +5,8 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
+use crate::law::activity::Activity;
+use crate::law::fdca::{Car, Choices};
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
@@ -33,6 +35,10 @@ const EARLY: Micros = Micros::from_us(500);
 /// runs away, which is a fault.
 const EARLY_STEPS: u8 = 3;
 
+/// Driver activity looks again where it has not for so long, and for so long in any step.
+const LONG_WAIT: Micros = Micros::from_ms(12);
+const LONGEST_WAIT: Micros = Micros::from_ms(50);
+
 /// A lane sample no older than this when it arrives is continued at its own rates; an older one is also corrected by how the
 /// vehicle has turned since.
 const PROMPT: Micros = Micros::from_ms(10);
@@ -56,6 +62,8 @@ pub(super) struct Step<'a, I> {
     pub(super) inputs: &'a Inputs,
     /// The lane that the law uses: the input's, or the last one, extrapolated.
     pub(super) lane: Input<LaneSample>,
+    /// It was old when it arrived.
+    pub(super) is_late: bool,
     pub(super) elapsed: Micros,
     pub(super) injection: &'a I,
 }
@@ -133,8 +141,12 @@ impl<I: Injection> Step<'_, I> {
             checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let ego = self.ego_motion(v, last);
-        let demanded = self.config.law.demanded(&v.law, self.now, ego.as_ref());
+        let is_late = self.came_late(v, last);
+        let demanded = if self.config.law.is_fdca() {
+            self.demanded_by_fdca(v, last, is_late)
+        } else {
+            self.demanded_by_paper(v, last, is_late)
+        };
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
@@ -177,7 +189,7 @@ impl<I: Injection> Step<'_, I> {
     /// Takes new inputs through the plausibility checks, and forgets what the checks know of lost ones. Returns the faults of
     /// lost inputs.
     fn update_inputs(
-        &self,
+        &mut self,
         v: &mut Memory,
         changed: &mut ChangedParts,
         fast_enough: Option<bool>,
@@ -194,6 +206,10 @@ impl<I: Injection> Step<'_, I> {
 
         if let Input::New(motion) = motion {
             self.update_motion(v, changed, motion, motion_history, &mut kept);
+            if let Some(least) = self.config.plausibility.between.least_share() {
+                let left = pending.activity.share(least);
+                v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
+            }
         }
         if fast_enough != Some(true) {
             changed.add(ChangedParts::LANE);
@@ -317,7 +333,34 @@ impl<I: Injection> Step<'_, I> {
                     kept.insert(Fault::YawRate);
                 }
             }
+            if self.config.plausibility.between.least_share().is_some() {
+                pending.lane |= self.look_at_activity(v, &mut pending.activity);
+            }
         }
+    }
+
+    /// Driver activity looks at the column in the steps that check a lane sample, unless a vehicle frame came too: those have the
+    /// most to do. Where a camera always keeps step with the vehicle frames, the next step repeats the check, and looks. Not inlined,
+    /// so that it costs (9) nothing.
+    #[cold]
+    #[inline(never)]
+    fn look_at_activity(&self, v: &Memory, activity: &mut Activity) -> bool {
+        if let Some(column) = self.inputs.column.value()
+            && let Some(least) = self.config.plausibility.between.least_share()
+        {
+            let waited = v.input_times.column.since(activity.looked_at());
+            if matches!(self.inputs.motion, Input::New(_)) && waited < LONGEST_WAIT {
+                return waited > LONG_WAIT;
+            }
+            activity.update(
+                &self.config.law,
+                least,
+                v.input_times.column,
+                column.wheel_angle,
+                [column.driver_torque, self.applied],
+            );
+        }
+        false
     }
 
     /// A time-out fault for each input without a usable value.
@@ -347,12 +390,12 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// How far the vehicle has turned since the lane sample in use, where that was old when it arrived.
-    fn compensate_age(&self, v: &mut Memory, motion_history: &MotionHistory) {
+    fn compensate_age(&mut self, v: &mut Memory, motion_history: &MotionHistory) {
         let Some(sample) = self.lane.value() else {
             return;
         };
-        let age = self.now.since(sample.at);
-        if age.us().saturating_sub(self.now.since(v.input_times.lane).us()) <= PROMPT.us() {
+        self.is_late = self.came_late(v, sample);
+        if !self.is_late {
             (v.fast.turned, v.fast.rate_then) = (Radians::ZERO, TurningRate::ZERO);
         } else if let Input::New(_) = self.lane {
             (v.fast.turned, v.fast.rate_then) = motion_history.turned(self.now, sample.at);
@@ -362,23 +405,26 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
-    /// How the vehicle's motion since an old sample differs from going on at the rate of turn that it had then; `None` for a
-    /// sample that was not old.
+    /// Whether a sample was old when it arrived.
     #[inline(always)]
-    fn ego_motion(&self, v: &Memory, sample: LaneSample) -> Option<EgoMotion> {
+    fn came_late(&self, v: &Memory, sample: LaneSample) -> bool {
+        let [age, held] = [sample.at, v.input_times.lane].map(|at| self.now.since(at).us());
+        age.saturating_sub(held) > PROMPT.us()
+    }
+
+    /// How the vehicle's motion since an old sample differs from going on at the rate of turn that it had then.
+    #[inline(always)]
+    fn ego_motion(&self, v: &Memory, sample: LaneSample) -> EgoMotion {
         let age = self.now.since(sample.at);
-        if age.us().saturating_sub(self.now.since(v.input_times.lane).us()) <= PROMPT.us() {
-            return None;
-        }
         let went_on = per_second(v.fast.rate_then.fixed(), age);
         let speed = v.plausibility.speed();
         let near = product(self.config.plausibility.near_time.fixed(), speed.fixed());
-        Some(EgoMotion::new(
+        EgoMotion::new(
             v.fast.turned.minus(Radians::from_fixed(went_on)),
             v.plausibility.turning().minus(v.fast.rate_then),
             speed,
             Metres::from_wide(near),
-        ))
+        )
     }
 
     /// Whether both speeds reach the slowest that is guided, if they are known.
@@ -556,6 +602,35 @@ impl<I: Injection> Step<'_, I> {
         self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
+    /// What (9) demands for the sample that it took last.
+    #[inline(always)]
+    fn demanded_by_paper(&self, v: &Memory, sample: LaneSample, is_late: bool) -> Torque {
+        let ego = is_late.then(|| self.ego_motion(v, sample));
+        self.config.law.demanded(&v.law, self.now, ego.as_ref())
+    }
+
+    /// What FDCA demands for that sample. Not inlined, so that it costs (9) nothing.
+    #[cold]
+    #[inline(never)]
+    fn demanded_by_fdca(&self, v: &Memory, sample: LaneSample, is_late: bool) -> Torque {
+        let ego = is_late.then(|| self.ego_motion(v, sample));
+        let car = Car {
+            speed: v.plausibility.speed(),
+            turning_gain: v.plausibility.turning_gain(),
+            turning: v.plausibility.turning(),
+            aligning: self.config.plausibility.aligning_gain,
+        };
+        Choices::of(&self.config.law).demanded(&v.law, self.now, ego.as_ref(), &car)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn fdca(&self, v: &Memory) -> Torque {
+        self.lane.value().map_or(Torque::ZERO, |sample| {
+            self.demanded_by_fdca(v, sample, self.is_late)
+        })
+    }
+
     /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
     /// ends guidance then. Without a lane the torque is zero.
     fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
@@ -564,10 +639,14 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(ChangedParts::LAW);
                 self.config.law.update(&mut v.law, sample);
             }
-            self.config
-                .law
-                .demanded(&v.law, self.now, self.ego_motion(v, sample).as_ref())
+            self.demanded_by_paper(v, sample, self.is_late)
         });
+        // In the place of (9), whose words make no sense then: asked before, it would cost (9) more.
+        let demanded = if self.config.law.is_fdca() {
+            self.fdca(v)
+        } else {
+            demanded
+        };
         let demanded = self.injection.law(v.coast.limited(demanded));
         // Clamped to 0 to 1: beyond that the host is wrong.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
@@ -583,7 +662,7 @@ impl<I: Injection> Step<'_, I> {
 /// checks nothing. Where every step has a new value, every second one is checked, over the time of both.
 fn to_check<T: Copy>(input: &Input<T>, is_pending: &mut bool) -> Option<T> {
     let was_pending = core::mem::replace(is_pending, matches!(input, Input::New(_)) && !*is_pending);
-    input.value().filter(|_| was_pending)
+    if was_pending { input.value() } else { None }
 }
 
 fn add_probe(guidance: Torque, probe: Option<Torque>) -> Torque {

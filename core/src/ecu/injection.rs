@@ -100,10 +100,12 @@ pub enum Region {
     Ecu,
     /// The monitor's limits.
     Monitor,
+    /// What the monitor knows of FDCA.
+    Fdca,
 }
 
 impl Region {
-    /// Every region.
+    /// Every region that each step compares.
     pub const ALL: [Self; 4] = [Self::Config, Self::Controller, Self::Ecu, Self::Monitor];
 }
 
@@ -133,6 +135,7 @@ impl Ecu {
                 flip(&mut self.memory, bit, &mut words);
             }
             Region::Monitor => flip(&mut self.monitor, bit, &mut words),
+            Region::Fdca => flip(&mut self.fdca, bit, &mut words),
         }
         words.saturating_mul(32)
     }

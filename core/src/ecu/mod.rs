@@ -24,9 +24,9 @@ use crate::safety::actuator::Motor;
 use crate::safety::envelope::LimitReason;
 use crate::safety::faults::{Fault, FaultHistory, FaultSet};
 use crate::safety::modes::Mode;
-use crate::safety::monitor::{Evidence, Monitor, MonitorState};
+use crate::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState, New};
 use crate::safety::redundant::{Redundant, words};
-use receivers::{Accepted, Receivers};
+use receivers::Receivers;
 
 /// How the ECU came up: what the firmware knows before the first step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -96,6 +96,8 @@ pub struct Ecu {
     controller: Controller,
     state: ControllerState,
     monitor: Redundant<Monitor>,
+    /// Compared where it is read, as (9) has no use for it.
+    fdca: Redundant<Fdca>,
     memory: Redundant<Memory>,
     receivers: Receivers,
     history: FaultHistory,
@@ -159,6 +161,7 @@ impl Ecu {
             controller: Controller::new(setup.config),
             state: ControllerState::with(mode, now),
             monitor: Redundant::new(setup.monitor),
+            fdca: Redundant::new(setup.fdca),
             memory: Redundant::new(Memory::new(faults, now)),
             receivers: Receivers::new(e2e, now),
             history: FaultHistory::new(now),
@@ -213,7 +216,7 @@ impl Ecu {
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);
         faults.set(motor == Motor::Weak, Fault::MotorWeak);
         if has_test_come(&mut self.is_test_due, steps, &inputs) {
-            let passes = passes_self_test(monitor, steps / SELF_TEST, injection);
+            let passes = passes_self_test(monitor, &mut self.fdca, steps / SELF_TEST, injection);
             faults.insert_if(!passes, Fault::SelfTest);
         }
         faults.insert_if(monitor.is_none(), Fault::Memory);
@@ -224,16 +227,13 @@ impl Ecu {
         command.torque = Guidance::rounded(command.torque);
         let mut guidance = self.guidance(&command, steps);
 
-        let accepted = &self.receivers.accepted;
         let evidence = Evidence {
-            lane: accepted.lane.as_ref(),
-            column: accepted.column.as_ref(),
-            request: accepted.request.as_ref(),
+            frames: &self.receivers.frames,
             guidance: guidance.bytes(),
             elapsed_us,
         };
         let v = self.memory.value_mut();
-        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
+        let permitted = permits(monitor, &mut v.monitor, &mut self.fdca, &evidence, injection);
         faults.insert_if(!permitted, Fault::Monitor);
         v.step = LastStep {
             applied: if permitted { command.torque } else { Torque::ZERO },
@@ -241,9 +241,9 @@ impl Ecu {
             at: now,
             count: steps.wrapping_add(1),
         };
-        seal(&mut self.memory, evidence.lane.is_some());
+        seal(&mut self.memory, self.receivers.frames.new.lane);
         // Each accepted frame is shown to the monitor once.
-        self.receivers.accepted = Accepted::NONE;
+        self.receivers.frames.new = New::default();
         if !permitted {
             command = Command {
                 torque: Torque::ZERO,
@@ -398,17 +398,20 @@ fn sample(column: &Input<ColumnState>, now: Instant, applied: Torque) -> Option<
 /// The self-test: in each turn the monitor must refuse a frame that only one of its rules refuses. A monitor whose copies differ
 /// refuses everything, and so passes.
 #[inline(never)]
-fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injection: &I) -> bool {
+fn passes_self_test<I: Injection>(
+    monitor: Option<&Monitor>,
+    fdca: &mut Redundant<Fdca>,
+    turn: u32,
+    injection: &I,
+) -> bool {
     monitor.is_none_or(|monitor| {
         let (mut state, guidance) = monitor.self_test_vector(turn);
         let evidence = Evidence {
-            lane: None,
-            column: None,
-            request: None,
+            frames: &Frames::NONE,
             guidance: &guidance,
             elapsed_us: 1000,
         };
-        !permits(Some(monitor), &mut state, &evidence, injection)
+        !permits(Some(monitor), &mut state, fdca, &evidence, injection)
     })
 }
 
@@ -416,9 +419,10 @@ fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injectio
 fn permits<I: Injection>(
     monitor: Option<&Monitor>,
     state: &mut MonitorState,
+    fdca: &mut Redundant<Fdca>,
     evidence: &Evidence<'_>,
     injection: &I,
 ) -> bool {
     injection.monitor_passes(evidence.guidance)
-        || monitor.is_some_and(|monitor| monitor.step(state, evidence))
+        || monitor.is_some_and(|monitor| monitor.step(state, fdca, evidence))
 }

@@ -11,6 +11,7 @@ use crate::law::LaneSample;
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
 use crate::safety::actuator::Actuator;
 use crate::safety::faults::Fault;
+use crate::safety::monitor::Frames;
 use crate::safety::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
 use crate::safety::redundant::{Redundant, Words};
 
@@ -236,22 +237,6 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
     is_short.then_some(followed)
 }
 
-/// Bytes of the frames accepted since the last step: the monitor decodes them by itself.
-#[derive(Debug, Clone)]
-pub(super) struct Accepted {
-    pub(super) lane: Option<[u8; 8]>,
-    pub(super) column: Option<[u8; 8]>,
-    pub(super) request: Option<[u8; 8]>,
-}
-
-impl Accepted {
-    pub(super) const NONE: Self = Self {
-        lane: None,
-        column: None,
-        request: None,
-    };
-}
-
 /// A [`Request`], its flags in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
@@ -296,7 +281,8 @@ pub(super) struct Receivers {
     pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
-    pub(super) accepted: Accepted,
+    /// What the monitor decodes by itself.
+    pub(super) frames: Frames,
     /// Steps for which a frame under an identifier of this ECU is still a fault. Not kept twice: a flip raises the fault
     /// for a while, or ends it early.
     foreign: u32,
@@ -343,7 +329,7 @@ impl Receivers {
             motion: Slot::redundant(e2e, Motion::default(), now),
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
-            accepted: Accepted::NONE,
+            frames: Frames::NONE,
             foreign: 0,
             standing: Standing {
                 at_most: Speed::ZERO,
@@ -356,7 +342,7 @@ impl Receivers {
     pub(super) fn receive(&mut self, frame: &Frame, now: Instant) -> Option<Result<(), Reject>> {
         let Self {
             actuator,
-            accepted,
+            frames,
             standing,
             ..
         } = self;
@@ -365,7 +351,7 @@ impl Receivers {
                 let preview = LanePreview::decode(&mut slot.e2e, frame)?;
                 take_preview(slot, &preview, now)?;
                 if preview.valid {
-                    accepted.lane = Some(*frame.bytes());
+                    (frames.new.lane, frames.lane) = (true, *frame.bytes());
                 }
                 Ok(())
             }),
@@ -377,13 +363,14 @@ impl Receivers {
                 };
                 slot.put(column, now, COLUMN_PERIOD);
                 actuator.deliver(c.motor_torque);
-                accepted.column = Some(*frame.bytes());
+                (frames.new.column, frames.column) = (true, *frame.bytes());
                 Ok(())
             }),
             Vehicle::ID => {
                 let heard = self.motion.change(|slot| {
                     let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
+                    frames.vehicle = *frame.bytes();
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
                     Ok(())
@@ -401,7 +388,7 @@ impl Receivers {
                     authority: request.authority,
                 };
                 slot.put(request, now, REQUEST_PERIOD);
-                accepted.request = Some(*frame.bytes());
+                (frames.new.request, frames.request) = (true, *frame.bytes());
                 Ok(())
             }),
             // A node does not receive its own frames: another one sends in this ECU's name.

@@ -13,8 +13,12 @@
 //! Error: at most 0.2 mN.m from a float64 evaluation of the same discrete law over the whole input range
 //! (`core/tests/law_oracle.rs` asserts it). Cost: see `cargo xtask bench`.
 //!
+//! The parameters may choose to leave only a share of it, by the driver's [`activity`], or [`fdca`] in its place.
+//!
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
+pub mod activity;
+pub mod fdca;
 pub mod probe;
 pub mod schedule;
 pub(crate) mod sine;
@@ -47,7 +51,7 @@ words! {
 pub struct Law {
     /// K_1*a1'.
     pub(crate) e_y: TorquePerLength,
-    /// K_1*a2'.
+    /// K_1*a2'; below zero where the words of this law are those of FDCA ([`fdca::Choices`]).
     pub(crate) e_y_rate: TorquePerSpeed,
     /// K_1*a3'.
     pub(crate) e_theta: TorquePerAngle,
@@ -153,6 +157,19 @@ impl LawState {
         late
     }
 
+    /// The errors continued at their rates: at most 128 and half of what a rate may be.
+    #[inline(always)]
+    fn continued(&self, age: Micros) -> [I12F20; 2] {
+        let now = |error: I8F24, rate: I12F20| {
+            let rounded = I12F20::wrapping_from_num(error.saturating_add(HALF));
+            rounded.saturating_add(per_second(rate, age))
+        };
+        [
+            now(self.last.e_y.fixed(), self.e_y_rate),
+            now(self.last.e_theta.fixed(), self.e_theta_rate),
+        ]
+    }
+
     /// Whether the sample is the one taken last.
     pub(crate) fn is_latest(&self, sample: &LaneSample) -> bool {
         self.has_last != 0 && self.last == *sample
@@ -241,15 +258,10 @@ impl Law {
     /// rates, so that every product has 44: an error's 2^-21 of rounding costs at most 0.02 mN.m at the
     /// largest gain of 32. With that gain a product has at most 2^60, and the sum of four 2^62.
     fn torque(&self, state: &LawState, age: Micros) -> Torque {
-        // Errors continued at their rates: at most 128 and half of what a rate may be.
-        let now = |error: I8F24, rate: I12F20| {
-            let rounded = I12F20::wrapping_from_num(error.saturating_add(HALF));
-            rounded.saturating_add(per_second(rate, age))
-        };
-        let (e_y, e_theta) = (state.last.e_y.fixed(), state.last.e_theta.fixed());
-        let sum = (self.e_y.fixed().wide_mul(now(e_y, state.e_y_rate)))
+        let [e_y, e_theta] = state.continued(age);
+        let sum = (self.e_y.fixed().wide_mul(e_y))
             .wrapping_add(self.e_y_rate.fixed().wide_mul(state.e_y_rate))
-            .wrapping_add(self.e_theta.fixed().wide_mul(now(e_theta, state.e_theta_rate)))
+            .wrapping_add(self.e_theta.fixed().wide_mul(e_theta))
             .wrapping_add(self.e_theta_rate.fixed().wide_mul(state.e_theta_rate));
         Torque::from_wide(rounded(sum))
     }

@@ -43,12 +43,13 @@ impl Schedule {
     /// The share at a speed.
     #[must_use]
     pub fn share(&self, speed: Speed) -> Ratio {
-        let (per, least) = if speed < MIDDLE {
-            (self.per_slower, self.slow)
+        let faster = speed.minus(MIDDLE);
+        let (per, least, apart) = if faster < Speed::ZERO {
+            (self.per_slower, self.slow, faster.opposite())
         } else {
-            (self.per_faster, self.fast)
+            (self.per_faster, self.fast, faster)
         };
-        let taken = product(per.fixed(), speed.minus(MIDDLE).abs().fixed());
+        let taken = product(per.fixed(), apart.fixed());
         Ratio::ONE.minus(Ratio::from_wide(taken)).max(least)
     }
 }

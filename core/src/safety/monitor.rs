@@ -15,7 +15,10 @@
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-use crate::safety::redundant::words;
+mod fdca;
+
+use crate::safety::redundant::{Redundant, words};
+pub use fdca::Fdca;
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -30,7 +33,7 @@ words! {
         pub(crate) band_mnm: i32,
         /// Amplitude of the probe.
         pub(crate) probe_mnm: i32,
-        /// Law, mN.m per m, per rad, per m/s, per rad/s.
+        /// Equation (9), mN.m per m, per rad, per m/s, per rad/s; the third is below zero, and the others zero, where the law is FDCA.
         pub(crate) gains_mnm: [i32; 4],
     }
 }
@@ -82,15 +85,53 @@ words! {
     }
 }
 
+/// Bytes of the newest frames in use, and which came since the last step. Not kept twice: a flipped bit lasts until the next frame, for
+/// less than the time for which a torque may be astray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frames {
+    /// Lane preview.
+    pub lane: [u8; 8],
+    /// Column.
+    pub column: [u8; 8],
+    /// Request.
+    pub request: [u8; 8],
+    /// Vehicle.
+    pub vehicle: [u8; 8],
+    /// Which of them are new.
+    pub new: New,
+}
+
+/// Which frames are new; the vehicle's is only ever looked up.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct New {
+    /// Lane preview.
+    pub lane: bool,
+    /// Column.
+    pub column: bool,
+    /// Request.
+    pub request: bool,
+}
+
+impl Frames {
+    /// None came.
+    pub const NONE: Self = Self {
+        lane: [0; 8],
+        column: [0; 8],
+        request: [0; 8],
+        vehicle: [0; 8],
+        new: New {
+            lane: false,
+            column: false,
+            request: false,
+        },
+    };
+}
+
 /// What the monitor is shown every millisecond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Evidence<'a> {
-    /// Bytes of the latest lane preview frame in use, if a new one arrived.
-    pub lane: Option<&'a [u8; 8]>,
-    /// Bytes of the latest column frame in use, if a new one arrived.
-    pub column: Option<&'a [u8; 8]>,
-    /// Bytes of the latest request frame in use, if a new one arrived.
-    pub request: Option<&'a [u8; 8]>,
+    /// Frames that arrived.
+    pub frames: &'a Frames,
     /// Bytes of the guidance frame about to leave.
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
@@ -168,12 +209,21 @@ impl Monitor {
     /// `false` it is never renewed.
     #[must_use]
     #[inline(always)]
-    pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
+    pub fn step(
+        &self,
+        state: &mut MonitorState,
+        fdca: &mut Redundant<Fdca>,
+        evidence: &Evidence<'_>,
+    ) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if state.observe(evidence, elapsed_us) {
-            self.update_demand(state);
+        if let Some(apart_us) = state.observe(evidence, elapsed_us) {
+            if self.is_fdca() {
+                ask_fdca(state, fdca, evidence, apart_us);
+            } else {
+                self.update_demand(state);
+            }
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
@@ -241,6 +291,10 @@ impl Monitor {
         }
         let shrink = beyond.saturating_mul(OVERRIDE_SLOPE);
         self.limit_mnm.saturating_sub(shrink).max(0)
+    }
+
+    const fn is_fdca(&self) -> bool {
+        self.gains_mnm[2] < 0
     }
 
     /// What a new lane sample asks for.
@@ -336,15 +390,15 @@ impl Monitor {
 }
 
 impl MonitorState {
-    /// Takes the frames that arrived; `true` for a new lane sample.
+    /// Takes the frames that arrived. With a new lane sample, returns how much newer it is than the last.
     #[inline(always)]
-    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> Option<i32> {
+        let mut newer = None;
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
         let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
-        let lane = evidence
-            .lane
-            .filter(|_| unseen_us <= UNSEEN_US || !says_aside(evidence.guidance));
-        if let Some(bytes) = lane {
+        let frames = evidence.frames;
+        if frames.new.lane && (unseen_us <= UNSEEN_US || !says_aside(evidence.guidance)) {
+            let bytes = &frames.lane;
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
@@ -353,6 +407,7 @@ impl MonitorState {
                 .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
                 .saturating_mul(100);
             let apart_us = self.step.age_us.saturating_sub(age_us);
+            newer = Some(apart_us);
             // After a gap there is no rate.
             if self.step.age_us > OLDEST_LANE_US {
                 (self.lane_state.before, self.lane_state.older_us) = (new, 0);
@@ -363,14 +418,14 @@ impl MonitorState {
             }
             (self.lane_state.lane, self.lane_state.came_us, self.step.age_us) = (new, age_us, age_us);
         }
-        if let Some(bytes) = evidence.column {
-            self.step.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
+        if frames.new.column {
+            self.step.driver_mnm = field(&frames.column, 12, 18).saturating_mul(1000) / 4096;
         }
         self.step.probe_left_us = self.step.probe_left_us.saturating_sub(elapsed_us).max(0);
-        if evidence.request.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
+        if frames.new.request && field(&frames.request, 21, 1) != 0 {
             self.step.probe_left_us = PROBE_END_US;
         }
-        lane.is_some()
+        newer
     }
 
     /// How fast the lane errors move, mm/s and urad/s.
@@ -392,6 +447,18 @@ impl MonitorState {
             .saturating_div(span_ms)
             .saturating_mul(1000);
         (e_y_mmps, e_theta_urps)
+    }
+}
+
+/// The same of FDCA, whose copies have to agree. Not inlined, so that it costs (9) nothing.
+#[cold]
+#[inline(never)]
+fn ask_fdca(state: &mut MonitorState, fdca: &mut Redundant<Fdca>, evidence: &Evidence<'_>, apart_us: i32) {
+    if let Some((least, most)) = fdca.change(|fdca| fdca.see(state, evidence, apart_us)) {
+        state.lane_state.position_mnm = least;
+        state.lane_state.rate_mnm = most.saturating_sub(least);
+    } else {
+        state.step.withdrawn = 1;
     }
 }
 

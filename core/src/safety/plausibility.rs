@@ -37,6 +37,7 @@
 use fixed::types::{I0F32, I8F24, I40F24};
 
 use crate::law::LaneSample;
+use crate::law::activity::TimeAndShare;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, Instant, Metres, Micros, Radians, Ratio, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
@@ -61,7 +62,7 @@ words! {
         pub(crate) far_time: Seconds,
         /// t'_n, s; and the time that the vehicle needs from the near point to the far point, at least 0.
         pub(crate) near_time: Seconds,
-        pub(crate) between: Micros,
+        pub(crate) between: TimeAndShare,
     }
 }
 
@@ -202,6 +203,11 @@ impl PlausibilityState {
     #[must_use]
     pub const fn speed(&self) -> Speed {
         self.motion.speed
+    }
+
+    /// The yaw rate per wheel angle at that speed.
+    pub(crate) const fn turning_gain(&self) -> TurningRatePerAngle {
+        self.motion.turning_gain
     }
 
     /// Compares two speeds that arrive `passed` after the last ones. Returns whether they agree, and whether they
@@ -483,7 +489,7 @@ impl Plausibility {
         now: Instant,
         at: Instant,
     ) -> Option<I8F24> {
-        let near = motion_history.line_direction(now, at, self.between)?;
+        let near = motion_history.line_direction(now, at, self.between.time())?;
         let turning = motion_history.heading(now, at).rate;
         let along = saturate(product(state.motion.speed.fixed(), near.fixed()));
         let reach = saturate(product(self.near_time.fixed(), state.motion.speed.fixed()));
@@ -556,7 +562,7 @@ mod tests {
         column_damping: TorquePerTurningRate::from_nm_s_per_rad(0.57),
         far_time: Seconds::from_s(0.7),
         near_time: Seconds::from_s(0.3),
-        between: Micros::from_us(400_000),
+        between: TimeAndShare::new(Micros::from_us(400_000), None),
     };
 
     #[test]

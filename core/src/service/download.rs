@@ -171,7 +171,7 @@ impl Download {
         let params = Params::from_values(&self.values);
         self.unlocked_ms = None;
         // A set that the next start would refuse is not taken.
-        let is_good = Setup::new(&params).is_ok();
+        let is_good = Setup::check(&params).is_ok();
         self.outcome = if is_good {
             WriteOutcome::Taken
         } else {

@@ -169,6 +169,10 @@ fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result
             "speed: a map over speeds has one at each place, and none that changes; leave [speed] out".into(),
         );
     }
+    let law = base.guidance().controller.law;
+    if law != 0.0 {
+        return Err(format!("guidance.law = {law}: a map is of the paper's law, 0").into());
+    }
     let scenario = base
         .to_builder()
         .course(stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?)

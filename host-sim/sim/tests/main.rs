@@ -4,4 +4,5 @@ mod changing_speed;
 mod driver_limit;
 mod fdca;
 mod own_law;
+mod shipped_laws;
 mod unguided;

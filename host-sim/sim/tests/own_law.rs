@@ -1,11 +1,14 @@
 //! Laws of one's own behind the shipping ECU: the paper's, laws that lie, every law by name; and the documents' page of them.
 
+use haptic_core::controller::params::{DRIVER_ACTIVITY, FDCA};
 use haptic_core::safety::modes::Mode;
 use haptic_sim::drivers::{AnyDriver, DRIVERS, HABITS};
 use haptic_sim::guidance::{Guidance, OverBus, OwnLaw};
 use haptic_sim::kind::{Kind, Make, Origin};
 use haptic_sim::laws::{Gains, LAWS, Law, LawView};
 use haptic_sim::models::STEP_S;
+use haptic_sim::parts::{Driver, DriverView, PaperVehicle};
+use haptic_sim::scenario::GuidanceParameters;
 use haptic_sim::{Action, Scenario, Simulation};
 
 fn law_of(kind: &Kind<dyn Law>, scenario: &Scenario) -> Box<dyn Law> {
@@ -147,5 +150,55 @@ fn every_law_drives_the_paper_s_course() {
             .map(|s| s.lateral_error_m.abs())
             .fold(0.0, f64::max);
         assert!(largest_m < 1.0, "{}: {largest_m}", kind.name);
+    }
+}
+
+/// Holds the wheel still, and from 5 s on pushes it with 50 N.m to one side for a second.
+#[derive(Clone)]
+struct Pushes(f64);
+
+impl Driver for Pushes {
+    fn look_ahead_s(&self) -> [f64; 2] {
+        [0.3, 1.0]
+    }
+
+    fn step(&mut self, view: &DriverView) -> f64 {
+        if (5000..6000).contains(&view.step) {
+            return self.0;
+        }
+        5.5 * (0.2 * view.lane.e_y_m + 5.0 * view.lane.e_theta_rad - view.wheel_angle_rad)
+            - 0.3 * view.wheel_rate_rad_per_s
+    }
+}
+
+/// 3 N.m for each beyond 0.8 N.m of opposition leave nothing of 5 N.m from 2.47 N.m on; the torque falls there by 8 N.m/s at least.
+#[test]
+fn a_driver_who_pushes_50_nm_has_no_guidance_against_him() {
+    for law in [0.0, DRIVER_ACTIVITY, FDCA] {
+        for push_nm in [50.0, -50.0] {
+            let mut guidance = GuidanceParameters::default();
+            guidance.controller.law = law;
+            let scenario = Scenario::builder().guidance(guidance).build().unwrap();
+            let vehicle = PaperVehicle::new(&scenario);
+            let ecu = OverBus::new(scenario.setup());
+            let mut simulation = Simulation::of_parts(&scenario, Pushes(push_nm), vehicle, ecu);
+            let (mut last_nm, mut step) = (0.0_f64, 0);
+            while let Some(outcome) = simulation.step(&Action::default()) {
+                let now_nm = outcome.applied_torque_nm;
+                assert!(
+                    now_nm.abs() <= 5.0 + 1.0 / 4096.0,
+                    "law {law}, {step} ms: {now_nm} N.m"
+                );
+                let pushed = (5010..6000).contains(&step);
+                let against = now_nm * push_nm < 0.0;
+                assert!(
+                    !(pushed && against) || now_nm.abs() <= (last_nm.abs() - 0.007).max(0.01),
+                    "law {law}, {step} ms: {now_nm} N.m after {last_nm}"
+                );
+                last_nm = now_nm;
+                step += 1;
+            }
+            assert!(step > 5100, "{step}");
+        }
     }
 }

@@ -80,6 +80,30 @@ fn words(command: &str) -> Vec<&str> {
     command.split_whitespace().collect()
 }
 
+/// Whether an example was built from the sources that are there. Cargo builds examples with all tests, beside the programs, but not
+/// with tests that are named.
+fn is_up_to_date(program: &Path) -> bool {
+    let changed = |path: &Path| path.metadata().and_then(|file| file.modified()).ok();
+    let built = changed(program);
+    let listed = std::fs::read_to_string(program.with_extension("d")).unwrap_or_default();
+    let sources = listed.split_once(": ").map_or("", |(_, sources)| sources);
+    !sources.is_empty()
+        && sources.split_whitespace().all(|source| {
+            let source = changed(Path::new(source));
+            source.is_some() && source <= built
+        })
+}
+
+fn build_example(name: &str) {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "-p", "host-sim", "--example", name]);
+    if !cfg!(debug_assertions) {
+        cargo.arg("--release");
+    }
+    let (code, _, err) = run(&mut cargo, &root(), name);
+    assert_eq!(code, Some(0), "{name}: {err}");
+}
+
 /// Runs one line of an `sh` block; what it printed.
 fn run_line(line: &str, block: &Block, place: &Path, at: &str) -> String {
     let shorter = SHORTER
@@ -101,13 +125,12 @@ fn run_line(line: &str, block: &Block, place: &Path, at: &str) -> String {
             "--example",
             example,
         ] => {
-            // Cargo builds examples with tests, beside the programs.
             let programs = Path::new(env!("CARGO_BIN_EXE_host-sim")).parent().unwrap();
-            run(
-                &mut Command::new(programs.join("examples").join(example)),
-                place,
-                &at,
-            )
+            let program = programs.join("examples").join(example);
+            if !is_up_to_date(&program) {
+                build_example(example);
+            }
+            run(&mut Command::new(program), place, &at)
         }
         ["cargo", "run", "--release", rest @ ..] => {
             let arguments = rest.strip_prefix(&["--"]).unwrap_or(rest);

@@ -77,6 +77,8 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
     for (row, key) in [
         ("mean", "mps2-an386 mean step"),
         ("worst", "mps2-an386 worst step"),
+        ("mean, driver activity", "mps2-an386 mean step, driver activity"),
+        ("worst, driver activity", "mps2-an386 worst step, driver activity"),
     ] {
         let count = golden(key);
         has(porting, format!("| {row} | {count} | {} |", share(&count)));

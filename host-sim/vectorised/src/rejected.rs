@@ -34,6 +34,8 @@ macro_rules! reasons {
 reasons! {
     /// A camera whose pictures come late, that is blind at times, or that jumps to another line.
     Camera "a camera that is late, blind at times, or on another line";
+    /// Another law than the paper's.
+    AnotherLaw "another law than the paper's";
     /// Exact sensors, past the bus.
     ExactSensors "exact sensors, past the bus";
     /// Slower than the controller guides.
@@ -138,6 +140,7 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
     let heard_m_per_s = f64::from(speed_heard(scenario)) * (1.0 / ONE);
     let reasons = [
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
+        (guided && params.law != 0.0, Reason::AnotherLaw),
         (guided && *sensors == Sensors::Exact, Reason::ExactSensors),
         (
             guided && heard_m_per_s < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
@@ -256,6 +259,12 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
                 far_time_s: _,
                 near_time_s: _,
             },
+        law: _,
+        // Without their laws they do not act.
+        activity_lambda_min: _,
+        fdca_k_y_rad_per_m: _,
+        fdca_k_psi: _,
+        fdca_lohs: _,
     } = controller;
     controller
 }

@@ -1,6 +1,6 @@
 //! Vectorised runs against runs one by one: the shipping ECU is the oracle.
 
-use haptic_core::controller::params::Params;
+use haptic_core::controller::params::{DRIVER_ACTIVITY, Params};
 use haptic_log::trace::Sample;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -338,6 +338,10 @@ fn what_cannot_be_vectorised_is_named_and_rejected() {
     let exact = Scenario::builder().sensors(Sensors::Exact).build().unwrap();
     assert_eq!(unsupported_reason(&exact), Some(Reason::ExactSensors));
     assert_eq!(unsupported_reason(&Scenario::default()), None);
+    let mut guidance = GuidanceParameters::default();
+    guidance.controller.law = DRIVER_ACTIVITY;
+    let another = Scenario::builder().guidance(guidance).build().unwrap();
+    assert_eq!(unsupported_reason(&another), Some(Reason::AnotherLaw));
     let equal = Speed::by_time_kmh(vec![0.0, 50.0], &[60.0; 2]);
     let equal = Scenario::builder().speed(equal).build().unwrap();
     assert_eq!(unsupported_reason(&equal), None);

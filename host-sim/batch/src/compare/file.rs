@@ -251,6 +251,12 @@ pub(crate) fn drives(
         if scenario.condition() == Condition::Manual || scenario.failure().kind != FailureKind::None {
             return Err(source.bad("scenario.condition = \"manual\": a law of kind \"none\" is no guidance"));
         }
+        let law = scenario.guidance().controller.law;
+        if law != 0.0 {
+            return Err(source.bad(format!(
+                "scenario.guidance.law = {law}: this file has its own laws, which take the place of the ECU's"
+            )));
+        }
         for speed in speeds_m_per_s {
             let built = scenario.to_builder().speed(Speed::Constant(*speed)).build();
             let built = built.map_err(|e| InputError::new(&here, e))?;

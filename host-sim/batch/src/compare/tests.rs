@@ -364,6 +364,18 @@ const WRONG: [(&str, &str, &str); 26] = [
     ),
 ];
 
+/// In this place it would be driven by laws that it does not name.
+#[test]
+fn a_law_of_the_ecu_is_refused_beside_laws_of_the_file() {
+    let text = FILE.replacen("[scenario]\n", "[scenario]\nguidance = { law = 1 }\n", 1);
+    assert_ne!(text, FILE);
+    let error = compare(&text, &Kinds::default()).err().unwrap().to_string();
+    assert!(
+        error.contains("scenario.guidance.law = 1: this file has its own laws"),
+        "{error}"
+    );
+}
+
 #[test]
 fn a_wrong_file_is_refused_by_field_value_and_range() {
     let kinds = Kinds::default();
