@@ -153,9 +153,9 @@ fn a_write_over_the_oldest_copy_cut_short_at_any_byte() {
 
 #[test]
 fn other_versions_and_values_out_of_range_are_no_good() {
-    assert_eq!(load([&block(1, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(3, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(2, 1, &VALUES[..21]), &[]]), None);
+    assert_eq!(load([&block(2, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(4, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(3, 1, &VALUES[..23]), &[]]), None);
     let ranges_end = [
         (0, 4.1),
         (5, 0.4),
@@ -175,6 +175,8 @@ fn other_versions_and_values_out_of_range_are_no_good() {
         (19, 10.1),
         (20, 3.1),
         (21, f64::NAN),
+        (22, 0.5),
+        (23, 1.1),
     ];
     for (index, value) in ranges_end {
         let mut values = VALUES;
