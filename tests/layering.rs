@@ -409,6 +409,7 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/campaign/src/trial.rs", "one run: what is drawn, driven and judged"),
     ("host-sim/report/src/studies/identify.rs", "one report, section by section"),
     ("host-sim/vectorised/src/runs.rs", "one block of all runs, read from top to bottom"),
+    ("host-sim/vectorised/src/tests.rs", "one oracle, and every kind of run beside it"),
     ("host-sim/vectorised/src/ecu.rs", "one step of the lean ECU, read from top to bottom"),
     ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
     ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),

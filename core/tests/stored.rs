@@ -178,6 +178,8 @@ fn other_versions_and_values_out_of_range_are_no_good() {
         (19, 10.1),
         (20, 3.1),
         (21, f64::NAN),
+        (22, 0.5),
+        (23, 1.1),
     ];
     for (index, value) in ranges_end {
         let mut values = VALUES;
