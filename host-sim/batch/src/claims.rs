@@ -7,9 +7,8 @@
 //! in numbers is this project's reading, stated in each claim. A claim that rests on a run in which the ECU ended guidance
 //! by itself is not held, whatever its numbers are.
 
-use serde::Serialize;
-
-use super::evaluate::{DRIVERS_T_P, EvaluationResults};
+pub use super::evaluation_results::Claim;
+use super::evaluation_results::{DRIVERS_T_P, EvaluationResults};
 use super::{Away, RunRecord, left_by_themselves};
 use haptic_analysis::metrics::Window;
 use haptic_sim::models::driver::DriverParameters;
@@ -56,17 +55,6 @@ const fn row(t_p: f64, condition: Condition, nominal_m: [f64; 2], failed_m: Opti
         nominal_m,
         failed_m,
     }
-}
-
-/// Something that the evaluation must show, and whether it did.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Claim {
-    /// The claim.
-    pub claim: String,
-    /// Whether it holds.
-    pub holds: bool,
-    /// The numbers behind it.
-    pub evidence: String,
 }
 
 /// How far a number may be from the table: share of it, and m; the larger counts.

@@ -3,21 +3,19 @@
 //! input fails, and the ECU hands over.
 
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::RunRecord;
-use super::claims::{self, Claim};
+use super::claims;
+pub use super::evaluation_results::{DRIVERS_T_P, EvaluationResults};
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use super::vectorised::run_batched;
 use crate::error::StudyError;
 use haptic_analysis::metrics::Window;
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, ScenarioError, Sensors};
+use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, ScenarioError};
 use haptic_sim::simulation::Run;
 
-/// Processing delays of the three drivers, s (table 7).
-pub const DRIVERS_T_P: [f64; 3] = [0.1, 0.3, 0.5];
 /// Runs of an evaluation: 3 drivers x (4 conditions + 2 x 3 that can fail).
 pub const RUNS: usize = 30;
 
@@ -29,45 +27,6 @@ pub struct Evaluation {
     pub runs: Vec<(Scenario, Run)>,
     /// What is handed on.
     pub results: EvaluationResults,
-}
-
-/// The results of an evaluation, as JSON holds them.
-#[derive(Debug, Clone, Serialize)]
-pub struct EvaluationResults {
-    /// Name of the course.
-    pub course: String,
-    /// Its length, m.
-    pub course_length_m: f64,
-    /// Speed at the start, km/h; the records have the mean, the least and the largest.
-    pub speed_kmh: f64,
-    /// When the guidance fails in the runs with failure, s.
-    pub failure_time_s: f64,
-    /// What the controller saw.
-    pub sensors: Sensors,
-    /// Stretch that was measured, m.
-    pub window_m: [f64; 2],
-    /// One record for each run: the 21 of section 5 (no failure, or a sudden loss of the torque), then the 9 in
-    /// which the guidance's input fails and the ECU hands over.
-    pub runs: Vec<RunRecord>,
-    /// What the evaluation must show, where it was run as the paper ran it; and wherever it was run, which runs were not
-    /// guided throughout, if there are such.
-    pub claims: Vec<Claim>,
-    /// What a reader has to know of these results.
-    pub notes: Vec<String>,
-}
-
-impl EvaluationResults {
-    /// The record of a run, if there is one.
-    pub fn record(&self, t_p: f64, condition: Condition, failure: FailureKind) -> Option<&RunRecord> {
-        self.runs
-            .iter()
-            .find(|r| r.t_p == t_p && r.condition == condition && r.failure == failure)
-    }
-
-    /// Whether no claim is broken.
-    pub fn all_claims_hold(&self) -> bool {
-        self.claims.iter().all(|claim| claim.holds)
-    }
 }
 
 /// Runs the evaluation on all cores. `base` gives course, speed, sensors, vehicle, guidance and the time of the

@@ -47,6 +47,7 @@ pub mod design;
 pub mod design_guidance;
 mod error;
 pub mod evaluate;
+mod evaluation_results;
 pub mod experiment;
 pub mod files;
 pub mod handover;

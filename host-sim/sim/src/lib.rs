@@ -52,6 +52,7 @@ pub mod participants;
 pub mod parts;
 pub mod population;
 mod preview;
+mod range;
 pub mod scenario;
 pub mod seeds;
 pub mod share;

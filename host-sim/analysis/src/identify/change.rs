@@ -8,6 +8,9 @@ use serde::Serialize;
 pub(crate) const T_D: &str = "driver_torque_nm";
 pub(crate) const E_Y: &str = "e_y_m";
 
+/// Shortest piece between two changes that is fitted, s.
+pub(crate) const SHORTEST_S: f64 = 10.0;
+
 /// How constant the driver of a record was.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Constancy {

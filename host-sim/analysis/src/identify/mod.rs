@@ -45,6 +45,7 @@ pub use paper::{TABLE_4, identify as identify_as_published};
 pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use recording::{Layout, Mapping, Table, of_bytes, of_table, open as open_mapped};
+pub use result::Refutation;
 pub use result::{
     AtTNms, Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant,
     Start, Traces, Whiteness,
@@ -53,4 +54,3 @@ pub use search::Termination;
 pub use signals::Muscle;
 pub use together::{identify_together, identify_together_and_track};
 pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, identify_and_track, track};
-pub use verdict::Refutation;

@@ -7,7 +7,7 @@
 
 use serde::Serialize;
 
-use super::change::Change;
+use super::change::{Change, SHORTEST_S};
 use super::log::DriveLog;
 use super::noise_model::identify_prepared;
 use super::options::Options;
@@ -35,8 +35,6 @@ pub struct Pieces {
     pub changes: Vec<Change>,
 }
 
-/// Shortest piece that is fitted, s.
-pub(crate) const SHORTEST_S: f64 = 10.0;
 /// Most changes that are looked for: more is no driver who has parameters.
 const MOST: usize = 20;
 

@@ -21,7 +21,22 @@ use super::change::{Change, Constancy};
 use super::prepare::Preflight;
 use super::search::{Bounds, Termination};
 use super::signals::Muscle;
-use super::verdict::{Refutation, SAME_DRIVER};
+
+/// An assumption that the record refutes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refutation {
+    /// The assumption.
+    pub assumption: &'static str,
+    /// What in the record says so.
+    pub evidence: String,
+    /// The likeliest cause.
+    pub cause: String,
+    /// What would cure it.
+    pub cure: String,
+}
+
+/// The assumption that a driver who changed refutes.
+pub(crate) const SAME_DRIVER: &str = "the driver is the same throughout";
 
 /// One parameter of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

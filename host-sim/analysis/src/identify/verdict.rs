@@ -5,25 +5,9 @@
 //! that are certain but too small to move anything that matters refute nothing: no record is long enough for a model
 //! of a driver to be exactly true.
 
-use serde::Serialize;
-
 use super::balance::Balance;
-use super::change::{Change, E_Y, T_D};
-use super::pieces::SHORTEST_S;
-use super::result::{InputCorrelation, Whiteness};
-
-/// An assumption that the record refutes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Refutation {
-    /// The assumption.
-    pub assumption: &'static str,
-    /// What in the record says so.
-    pub evidence: String,
-    /// The likeliest cause.
-    pub cause: String,
-    /// What would cure it.
-    pub cure: String,
-}
+use super::change::{Change, E_Y, SHORTEST_S, T_D};
+use super::result::{InputCorrelation, Refutation, SAME_DRIVER, Whiteness};
 
 /// Standard errors beyond which a difference is certain, with all the tests that are made of one record.
 pub(crate) const CERTAIN: f64 = 5.0;
@@ -48,9 +32,6 @@ pub(crate) const SIGNS: &str = "all torques and angles are positive to the left"
 
 /// The assumption that a sensor that changed refutes.
 const SAME_SENSORS: &str = "the sensors are the same throughout";
-/// The assumption that a driver who changed refutes.
-pub(crate) const SAME_DRIVER: &str = "the driver is the same throughout";
-
 /// What the balance of torques on the column refutes.
 pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
     if b.explained < BALANCE_SEEN {

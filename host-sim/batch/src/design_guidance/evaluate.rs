@@ -8,8 +8,7 @@ use haptic_sim::scenario::{FailureKind, GuidanceParameters, Scenario, ScenarioEr
 use haptic_sim::simulation::{DIVERGED_M, Run};
 use serde::{Deserialize, Serialize};
 
-use super::file::published;
-use super::{DesignGuidance, Gains, Member, Stage};
+use super::{DesignGuidance, Gains, Member, Stage, published};
 use crate::compare::{Faults, failures, measured, seed_of};
 use crate::error::StudyError;
 use crate::stability::growth;

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use haptic_core::controller::params::Params;
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::participants::participants;
 use haptic_sim::scenario::Scenario;
@@ -11,7 +10,7 @@ use serde::Deserialize;
 use toml::Table;
 
 use super::search::BARS;
-use super::{DesignGuidance, Gains, Member, Stage};
+use super::{DesignGuidance, Gains, Member, Stage, published};
 use crate::compare::{drives, unknown};
 use crate::files::Source;
 use crate::study::check_names;
@@ -56,14 +55,6 @@ struct StageFile {
     roads: Vec<String>,
     speeds_m_per_s: Vec<f64>,
     losses: u64,
-}
-
-/// The gains of table 8.
-pub(super) fn published() -> Gains {
-    let Params {
-        a_1, a_2, a_3, a_4, ..
-    } = Params::PAPER;
-    [a_1, a_2, a_3, a_4]
 }
 
 pub(super) fn from_text(

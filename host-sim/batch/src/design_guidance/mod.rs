@@ -17,6 +17,7 @@ mod search;
 #[cfg(test)]
 mod tests;
 
+use haptic_core::controller::params::Params;
 use std::path::Path;
 
 use crate::error::StudyError;
@@ -30,6 +31,14 @@ pub use search::{BARS, Bar, Choice, DesignResults, SetRow};
 
 /// The gains a_1' to a_4'.
 pub type Gains = [f64; 4];
+
+/// The gains of table 8.
+fn published() -> Gains {
+    let Params {
+        a_1, a_2, a_3, a_4, ..
+    } = Params::PAPER;
+    [a_1, a_2, a_3, a_4]
+}
 
 /// A driver of the population.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

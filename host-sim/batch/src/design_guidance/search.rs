@@ -5,8 +5,7 @@ use haptic_sim::seeds::named;
 use serde::Serialize;
 
 use super::evaluate::{CONFLICT, EFFORT, LOSS, NOISE, PEAK};
-use super::file::published;
-use super::{DesignGuidance, Evaluated, Figures, Gains, Member, Stage};
+use super::{DesignGuidance, Evaluated, Figures, Gains, Member, Stage, published};
 use crate::error::StudyError;
 
 /// What a set is held to: a figure over that of the paper's gains.

@@ -12,7 +12,7 @@ mod old_names;
 use serde::de::{DeserializeOwned, MapAccess};
 use serde::ser::{Serialize, SerializeMap};
 
-use crate::input::{RangeError, in_range};
+use crate::range::{RangeError, in_range};
 
 pub(crate) use in_file::InFile;
 pub use in_file::from_numbers;

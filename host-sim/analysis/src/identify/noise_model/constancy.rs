@@ -22,8 +22,9 @@ use super::sums::Rows;
 use super::{K_HG, Problem, T_P};
 use crate::identify::balance::balance;
 use crate::identify::change::{Change, Constancy, E_Y, T_D};
+use crate::identify::result::Refutation;
 use crate::identify::search::covariance;
-use crate::identify::verdict::{self, Refutation};
+use crate::identify::verdict;
 
 /// How much a change has to add to twice the log likelihood to be declared. At most two in a hundred constant drivers
 /// are then declared changed.

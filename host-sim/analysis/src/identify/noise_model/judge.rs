@@ -13,9 +13,10 @@ use super::{
 };
 use crate::identify::diagnostics;
 use crate::identify::options::Options;
+use crate::identify::result::Refutation;
 use crate::identify::result::{AtTNms, Identification, Parameter, Parameters, STANDARD_NORMAL_95};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
-use crate::identify::verdict::{self, Refutation};
+use crate::identify::verdict;
 
 /// Largest factor by which the scatter of the scores may widen a standard error: more is no noise.
 const WIDEST: f64 = 3.0;

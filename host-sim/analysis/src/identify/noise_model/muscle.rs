@@ -5,7 +5,8 @@ use nalgebra::DMatrix;
 use super::evidence::Alternative;
 use super::{NAMES, Problem, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S};
 use crate::identify::result::Identification;
-use crate::identify::verdict::{self, Refutation};
+use crate::identify::result::Refutation;
+use crate::identify::verdict;
 
 impl Problem<'_> {
     /// What the record refutes of the muscle and of the sensors' delays, each with what it adds to twice the log likelihood.
