@@ -403,7 +403,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/report/src/plot/mod.rs", "one figure as a value: the terms that studies draw with"),
     ("host-sim/report/src/studies/availability.rs", "one report, section by section"),
     ("host-sim/report/src/studies/validation.rs", "one report, section by section"),
-    ("host-sim/campaign/src/ecu_harness.rs", "what stands between the world and the ECU, with what it injects"),
     ("host-sim/campaign/src/invariants.rs", "every rule of a cycle beside the others"),
     ("host-sim/campaign/src/residual.rs", "the checks a second time, beside each other"),
     ("host-sim/campaign/src/trial.rs", "one run: what is drawn, driven and judged"),
