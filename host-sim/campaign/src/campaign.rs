@@ -7,6 +7,7 @@ use super::deviation::{Deviation, MOST_EXCESS_M};
 use super::drivers::{Drivers, Limits};
 use super::table::{Class, FaultCase, Place};
 use super::trial::{TrialOutcome, World};
+use haptic_core::controller::params::LAWS;
 use haptic_sim::share::wilson;
 
 /// What a campaign showed.
@@ -22,6 +23,8 @@ pub struct Campaign {
     pub world: Option<&'static str>,
     /// Who drove.
     pub drivers: Drivers,
+    /// Name of the guidance law on the ECU.
+    pub law: &'static str,
     /// How far a fault may move their vehicle.
     pub limits: Limits,
     /// The first seed.
@@ -36,6 +39,7 @@ impl Campaign {
             rows,
             world: None,
             drivers: Drivers::Paper,
+            law: LAWS[0],
             limits: Drivers::Paper.limits(),
             first_seed: 1,
         }
@@ -168,6 +172,7 @@ pub fn run(
     Campaign {
         world: world.kind().map(|kind| kind.name),
         drivers: world.drivers(),
+        law: world.law(),
         limits: world.drivers().limits(),
         first_seed: seeds.start,
         ..Campaign::new(rows)

@@ -28,7 +28,7 @@ use super::speed_change::SpeedChange;
 use super::table::{FaultCase, PlaceOnRoad};
 use super::trial_record::EcuTrace;
 use super::verdict::judge;
-use haptic_core::controller::params::Params;
+use haptic_core::controller::params::{LAWS, Params};
 use haptic_log::Event;
 use haptic_sim::Simulation;
 use haptic_sim::models::driver::ArmGains;
@@ -36,7 +36,7 @@ use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::vehicle::VehicleParameters;
-use haptic_sim::scenario::{Scenario, ScenarioBuilder, Speed};
+use haptic_sim::scenario::{GuidanceParameters, Scenario, ScenarioBuilder, Speed};
 use haptic_sim::seeds::{Stream, named};
 use haptic_sim::stability::{Guided, growth_per_s};
 use haptic_sim::worlds::{Surface, WorldKind};
@@ -77,6 +77,8 @@ pub struct World {
     /// What it has beyond the paper's world; nothing if `None`.
     kind: Option<&'static WorldKind>,
     driven_by: Drivers,
+    /// The guidance law on the ECU, by its place among [`LAWS`].
+    law: usize,
 }
 
 /// What a run showed.
@@ -129,6 +131,17 @@ impl World {
         self
     }
 
+    /// The same with another of the [`LAWS`] on the ECU, by its place among them.
+    pub fn guided_by(mut self, law: usize) -> Self {
+        self.law = law;
+        self
+    }
+
+    /// Name of the guidance law on the ECU.
+    pub fn law(&self) -> &'static str {
+        LAWS[self.law]
+    }
+
     /// Who drives in it.
     pub fn drivers(&self) -> Drivers {
         self.driven_by
@@ -140,10 +153,14 @@ impl World {
         let world = self
             .kind
             .map_or(String::new(), |kind| format!(" --world {}", kind.name));
+        let law = match self.law {
+            0 => String::new(),
+            _ => format!(" --law {}", self.law()),
+        };
         if self.driven_by == usual {
-            world
+            format!("{world}{law}")
         } else {
-            format!("{world} --drivers {}", self.driven_by.name())
+            format!("{world} --drivers {}{law}", self.driven_by.name())
         }
     }
 
@@ -167,6 +184,7 @@ impl World {
             turning_road: roads::turning(AFTER_MS, surface),
             kind,
             driven_by: Drivers::Paper,
+            law: 0,
         }
     }
 
@@ -232,7 +250,10 @@ impl World {
             None => self.road(row, [speed, place, side], drawn_ms),
             Some(change) => self.changing_road(row, change, [place, side], drawn_ms),
         };
+        let mut guidance = GuidanceParameters::default();
+        guidance.controller.law = self.law as f64;
         let scenario = Scenario::builder().course(course).speed(speed.clone()).seed(seed);
+        let scenario = scenario.guidance(guidance);
         let (driver, scenario) = match self.driven_by {
             Drivers::Paper => (
                 driver.name.clone(),

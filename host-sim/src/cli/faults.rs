@@ -5,6 +5,7 @@ use haptic_campaign::campaign;
 use haptic_campaign::drivers::Drivers;
 use haptic_campaign::table::{self as rows, FaultCase, Place};
 use haptic_campaign::{World, document, target};
+use haptic_core::controller::params::LAWS;
 use haptic_report::document::write_file;
 use haptic_report::studies::faults::{report, report_of_run};
 use haptic_sim::worlds::WORLDS;
@@ -35,11 +36,14 @@ pub(super) struct Arguments {
     /// `host-sim availability`, who keep the lane in a real one, or `relying`, those of them who rely on the guidance; default: `paper` without --world, `population` with it
     #[arg(long, value_name = "WHO", conflicts_with = "target", value_parser = Drivers::ALL.map(Drivers::name))]
     drivers: Option<String>,
+    /// The guidance law on the ECU. The table's limits of torque (2 N.m) and of reaction were chosen for the paper's
+    #[arg(long, conflicts_with = "target", default_value = LAWS[0], value_parser = LAWS)]
+    law: String,
     /// Run in QEMU: the image takes the ECU's place, for the rows marked Q
     #[arg(long)]
     target: bool,
     /// Print the table of faults, as docs/reference/fault-campaign.md has it, and run nothing
-    #[arg(long, conflicts_with_all = ["rows", "world", "drivers", "seeds", "first_seed", "seed", "target", "json", "out"])]
+    #[arg(long, conflicts_with_all = ["rows", "world", "drivers", "law", "seeds", "first_seed", "seed", "target", "json", "out"])]
     list: bool,
     #[command(flatten)]
     results: ResultArguments,
@@ -74,6 +78,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(drivers) => world.driven_by(drivers),
         None => world,
     };
+    let law = LAWS.iter().position(|law| *law == arguments.law);
+    let world = world.guided_by(law.unwrap_or_default());
     let runs = chosen.len() as u64 * (seeds.end - seeds.start);
     let campaign = progress::over(runs, "runs", |done| {
         if arguments.target {

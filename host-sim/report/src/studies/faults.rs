@@ -75,8 +75,12 @@ fn summary(campaign: &Campaign) -> String {
             )
         }
     };
+    let law = match campaign.law {
+        "paper" => String::new(),
+        law => format!("; guided by {law}, where the table's limits were chosen for the paper's law"),
+    };
     format!(
-        "{} rows, {} runs, {} cycles checked, {} failed{world}",
+        "{} rows, {} runs, {} cycles checked, {} failed{world}{law}",
         campaign.rows.len(),
         campaign.runs,
         campaign.cycles,
