@@ -29,7 +29,7 @@ const OUT_OF_ORDER: u64 = 3;
 const OUT_OF_RANGE: u64 = 4;
 const NOT_STANDING: u64 = 6;
 /// The machine does not wait for its client, whose speeds may be too old when a set comes: then it is sent again.
-const ATTEMPTS: usize = 30;
+const ATTEMPTS: usize = 60;
 
 /// `ParameterStatus`: stored, damaged, outcome, sequence.
 #[derive(Debug, PartialEq)]
