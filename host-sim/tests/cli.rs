@@ -260,6 +260,33 @@ fn studies_leave_their_pictures_when_asked() {
     }
 }
 
+/// FDCA asks for more than the table's 2 N.m there, equation (9) does not; what is printed to run it again names the law.
+#[test]
+fn the_faults_are_driven_with_the_law_that_is_asked_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = |more: &[&str]| {
+        let command = ["faults", "--rows", "jerk", "--seed", "6", "--json"];
+        host_sim(directory.path(), &[&command, more].concat())
+    };
+    let paper = json(&run(&[]));
+    assert_eq!(
+        (&paper["law"], &paper["rows"][0]["failures"]),
+        (&"paper".into(), &Value::Array(vec![]))
+    );
+    let fdca = json(&run(&["--law", "fdca"]));
+    assert_eq!(fdca["law"], "fdca");
+    let failure = &fdca["rows"][0]["failures"][0];
+    assert_eq!(
+        failure["replay"],
+        "host-sim faults --rows jerk --seed 6 --law fdca"
+    );
+    let unknown = run(&["--law", "band"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    for law in ["paper", "driver_activity", "fdca"] {
+        assert!(stderr(&unknown).contains(law), "{}", stderr(&unknown));
+    }
+}
+
 /// Nothing that a study prints is wider than the terminal, and the last line names the report.
 #[test]
 fn a_study_fits_the_terminal_and_names_its_report() {

@@ -7,6 +7,7 @@ use haptic_sim::scenario::{Condition, FailureKind, Sensors};
 
 /// Processing delays of the three drivers, s (table 7).
 pub const DRIVERS_T_P: [f64; 3] = [0.1, 0.3, 0.5];
+
 /// Something that the evaluation must show, and whether it did.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Claim {

@@ -35,6 +35,7 @@ impl Monitor {
             band_mnm: (monitor_band_nm(p) * 1e3 + 0.5) as i32,
             probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
             gains_mnm: if p.law == FDCA {
+                // A gain below zero says so: (9) has none.
                 [0, 0, -1, 0]
             } else {
                 [
