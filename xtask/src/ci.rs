@@ -218,11 +218,12 @@ fn in_its_own_process(stage: &Stage, begin: Instant) -> bool {
         Err(error) => {
             let text = fs::read_to_string(&log).unwrap_or_default();
             let lines: Vec<&str> = text.lines().collect();
-            let tail = &lines[lines.len().saturating_sub(150)..];
+            let tail = &lines[lines.len().saturating_sub(50)..];
             println!(
-                "{} {}: FAILED after {seconds} s: {error:#}\n--- the end of {}\n{}\n--- {}",
+                "{} {}: FAILED after {seconds} s: {error:#}\n{}--- the end of {}\n{}\n--- {}",
                 since(),
                 stage.name,
+                failures(&text),
                 log.display(),
                 tail.join("\n"),
                 stage.name
@@ -231,6 +232,20 @@ fn in_its_own_process(stage: &Stage, begin: Instant) -> bool {
         }
     }
     true
+}
+
+/// What `cargo test` says of the tests that failed, of every target: its sections from `failures:` to the target's result.
+fn failures(log: &str) -> String {
+    let mut inside = false;
+    let mut said = String::new();
+    for line in log.lines() {
+        inside = line == "failures:" || inside && !line.starts_with("test result: ");
+        if inside {
+            said += line;
+            said.push('\n');
+        }
+    }
+    said
 }
 
 /// Where each stage leaves its log.
@@ -408,7 +423,38 @@ fn speed() -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::{STAGES, When};
+    use super::{STAGES, When, failures};
+
+    #[test]
+    fn the_failures_of_every_target_are_found_in_a_log() {
+        let log = "\
+running 2 tests
+test a ... ok
+
+test result: ok. 2 passed; 0 failed
+running 2 tests
+test b ... FAILED
+
+failures:
+
+---- b stdout ----
+panicked at b.rs:1
+
+failures:
+    b
+
+test result: FAILED. 1 passed; 1 failed
+running 1 test
+test result: ok. 1 passed; 0 failed
+failures:
+    c
+test result: FAILED. 0 passed; 1 failed
+";
+        assert_eq!(
+            failures(log),
+            "failures:\n\n---- b stdout ----\npanicked at b.rs:1\n\nfailures:\n    b\n\nfailures:\n    c\n"
+        );
+    }
 
     #[test]
     fn the_hosted_ci_has_a_job_for_each_stage() {
