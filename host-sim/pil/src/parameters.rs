@@ -24,8 +24,8 @@ use super::port::Port;
 const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Statuses after a set was sent: its storing and the start take less than these seconds.
 const STATUSES: usize = 5;
-/// The parameters in use come one every 100 ms, and a frame may be lost.
-const VALUES_WITHIN: Duration = Duration::from_secs(10);
+/// The parameters in use come in turn, one every 100 ms, and a frame may be lost.
+const VALUES_WITHIN_ROUNDS: usize = 3;
 /// So many speeds of zero come first: the three of a new sender, and the hundred in a row of a vehicle that stands. In one piece:
 /// a pause of this computer between two would be a loss.
 const SPEEDS: u8 = 110;
@@ -167,29 +167,38 @@ impl Product {
     /// # Errors
     /// It does not tell all of them: it is locked for want of a set, or is an older one.
     pub fn values(&mut self) -> Result<Params, PilError> {
-        let until = Instant::now() + VALUES_WITHIN;
         let mut values = [None; PARAMETERS.len()];
-        while Instant::now() < until {
-            let Some(frame) = self
-                .port
-                .frame()?
-                .filter(|frame| frame.id() == ParameterValue::ID)
-            else {
-                continue;
-            };
-            if let Ok(value) = ParameterValue::decode(&mut { ReceiverState::TRUSTED }, &frame) {
-                values[usize::from(value.index)] = Some(f64::from(value.value));
+        for _ in 0..VALUES_WITHIN_ROUNDS * values.len() {
+            let Some(value) = self.value()? else { break };
+            if let Some(place) = values.get_mut(usize::from(value.index)) {
+                *place = Some(f64::from(value.value));
             }
             if values.iter().all(Option::is_some) {
                 return Ok(Params::from_values(&values.map(Option::unwrap_or_default)));
             }
         }
         Err(PilError::Failed(format!(
-            "the ECU told {} of {} parameters within {} s: it is locked for want of a set, or runs an older image",
+            "the ECU told {} of {} parameters in {VALUES_WITHIN_ROUNDS} rounds: it is locked for want of a set, or runs an \
+             older image",
             values.iter().flatten().count(),
-            PARAMETERS.len(),
-            VALUES_WITHIN.as_secs()
+            PARAMETERS.len()
         )))
+    }
+
+    /// The next parameter that the ECU tells, if it tells any.
+    fn value(&mut self) -> Result<Option<ParameterValue>, PilError> {
+        let until = Instant::now() + REPLY_TIMEOUT;
+        while Instant::now() < until {
+            if let Some(frame) = self
+                .port
+                .frame()?
+                .filter(|frame| frame.id() == ParameterValue::ID)
+                && let Ok(value) = ParameterValue::decode(&mut { ReceiverState::TRUSTED }, &frame)
+            {
+                return Ok(Some(value));
+            }
+        }
+        Ok(None)
     }
 
     /// The next status, and the mode of the last torque frame before it.
