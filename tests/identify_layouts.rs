@@ -18,10 +18,9 @@ fn read(path: &Path, layout: &str, manual: bool, maps: &[&str]) -> Result<(Drive
     let maps: Vec<Mapping> = maps.iter().map(|map| map.parse().unwrap()).collect();
     let how = Recording {
         manual,
-        layout: Some(&layout),
         ..Recording::default()
     };
-    open_mapped(path, &maps, &how).map_err(|e| e.to_string())
+    open_mapped(path, Some(&layout), &maps, &how).map_err(|e| e.to_string())
 }
 
 /// The recording of 160 s with other text in it.

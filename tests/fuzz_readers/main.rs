@@ -132,7 +132,7 @@ fn read_recording(bytes: &[u8], number: u64, format: Format, dbc: &str) {
             stretches: if number.is_multiple_of(3) { &stretches } else { &[] },
             ..How::default()
         };
-        let _ = of_bytes(bytes.to_vec(), Some(format), &[], &how);
+        let _ = of_bytes(bytes.to_vec(), Some(format), None, &[], &how);
     }
 }
 
@@ -146,7 +146,7 @@ fn csv() {
     fuzz("csv", &seeds::csv(), as_it_is, |bytes, number| {
         read_recording(bytes, number, Format::Csv, "");
         if number % 8 == 1 {
-            let _ = of_bytes(bytes.to_vec(), None, &[], &How::default());
+            let _ = of_bytes(bytes.to_vec(), None, None, &[], &How::default());
         }
         let _ = Trace::read_csv(bytes);
     });
@@ -246,7 +246,7 @@ fn the_seeds_are_good() {
         (Format::Parquet, seeds::parquet()),
     ] {
         assert!(
-            of_bytes(seeds[0].clone(), Some(format), &[], &how).is_ok(),
+            of_bytes(seeds[0].clone(), Some(format), None, &[], &how).is_ok(),
             "{format:?}"
         );
     }
@@ -256,14 +256,14 @@ fn the_seeds_are_good() {
         (Format::Blf, seeds::bus("blf")),
     ] {
         let whole = seeds.last().unwrap().clone();
-        of_bytes(whole, Some(format), &[], &How { manual: true, ..how }).expect("a drive");
+        of_bytes(whole, Some(format), None, &[], &How { manual: true, ..how }).expect("a drive");
     }
     for bytes in seeds::blf_objects() {
         let read = formats::read_bytes(seeds::blf_file(bytes), Format::Blf, None);
         assert!(matches!(read, Ok(Contents::Frames(frames)) if !frames.is_empty()));
     }
     let compressed = seeds::compressed_mat(seeds::table("mat").remove(0));
-    assert!(of_bytes(compressed, Some(Format::Mat), &[], &how).is_ok());
+    assert!(of_bytes(compressed, Some(Format::Mat), None, &[], &how).is_ok());
     assert!(formats::dbc::channels(&seeds::frames(40), HAPTIC_DBC).is_ok());
     for text in seeds::opendrive() {
         let text = String::from_utf8(text).unwrap();

@@ -79,10 +79,11 @@ impl How<'_> {
                 .map(|scenario| single_track(&scenario.get().inner)),
             manual: self.manual,
             stretches: &options.stretches,
-            layout: layout.as_ref(),
         };
         match drive {
-            Drive::File(path) => open_mapped(path, &maps, &how).map_err(|error| errors::input(py, error)),
+            Drive::File(path) => {
+                open_mapped(path, layout.as_ref(), &maps, &how).map_err(|error| errors::input(py, error))
+            }
             Drive::Columns(columns) => of_table(table_of(py, columns)?, &maps, &how)
                 .map_err(|error| errors::input(py, format!("columns: {error}"))),
         }

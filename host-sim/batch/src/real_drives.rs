@@ -207,10 +207,9 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> FileResu
     let judged = |by_hand| {
         let how = Recording {
             manual: by_hand,
-            layout: Some(layout),
             ..Recording::default()
         };
-        let log = open_mapped(path, &[], &how).map_err(|e| {
+        let log = open_mapped(path, Some(layout), &[], &how).map_err(|e| {
             let why = e.to_string();
             let place = format!("{}: ", path.display());
             why.strip_prefix(&place).map_or(why.clone(), str::to_owned)

@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             manual: arguments.manual,
             ..Recording::default()
         };
-        let (log, _) = open_mapped(path, &[], &how)?;
+        let (log, _) = open_mapped(path, None, &[], &how)?;
         logs.push((path.display().to_string(), log));
     }
     let output = arguments.results.begin("drivers")?;

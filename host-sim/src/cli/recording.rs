@@ -65,8 +65,7 @@ impl RecordingArguments {
                 .transpose()?,
             manual,
             stretches,
-            layout: layout.as_ref(),
         };
-        Ok(open_mapped(path, &maps, &recording)?)
+        Ok(open_mapped(path, layout.as_ref(), &maps, &recording)?)
     }
 }

@@ -158,11 +158,8 @@ pub fn recordings(
 
 /// None if the layout refuses the recording.
 fn identified(bytes: Vec<u8>, layout: &Layout) -> Option<Identification> {
-    let how = Recording {
-        layout: Some(layout),
-        ..Recording::default()
-    };
-    let (log, _) = of_bytes(bytes, Some(Format::Csv), &[], &how).ok()?;
+    let how = Recording::default();
+    let (log, _) = of_bytes(bytes, Some(Format::Csv), Some(layout), &[], &how).ok()?;
     let mut fit = identify_with_noise_model(&log, &Options::default());
     fit.traces = Traces::default();
     Some(fit)

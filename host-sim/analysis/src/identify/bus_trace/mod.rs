@@ -20,7 +20,6 @@ use can_dbc::Dbc;
 
 use super::log::jumps::jump;
 use super::log::{DriveLog, LogError, refuse};
-use super::recording::Layout;
 pub use far_point::SingleTrack;
 use haptic_log::candump::{self, CandumpFrame};
 use haptic_log::formats::dbc::{identifier, raw};
@@ -61,8 +60,6 @@ pub struct Recording<'a> {
     /// The stretches that will be used, s of the log's time; all of it if there is none. They choose a side where the clock
     /// was set.
     pub stretches: &'a [(f64, f64)],
-    /// What the columns of a table are, if not those of a log.
-    pub layout: Option<&'a Layout>,
 }
 
 /// Reads the log at `path`, a CSV file or a trace of `candump`; `dbc` says what the trace's frames mean, if it is not

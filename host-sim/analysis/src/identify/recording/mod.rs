@@ -33,18 +33,20 @@ const GUIDANCE: usize = 4;
 const DRIVER: usize = 5;
 const SPEED: usize = 6;
 
-/// Reads the log at `path`: a CSV file, a recording of the bus, or a file of another tool by its extension; `dbc` says what the
-/// frames of a bus mean, if it is not the product's own file. The sentences say what was converted or computed.
+/// Reads the log at `path`: a CSV file, a recording of the bus, or a file of another tool by its extension; `layout` says what
+/// the columns of a table are, if they are not those of a log. The sentences say what was converted or computed.
 ///
 /// # Errors
 /// As [`DriveLog::open`], with the channel; a column that is mapped twice.
 pub fn open(
     path: &Path,
+    layout: Option<&Layout>,
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
-    of_bytes(bytes, Format::from_path(path).ok(), maps, how).map_err(|e| LogError::in_file(path.display(), e))
+    of_bytes(bytes, Format::from_path(path).ok(), layout, maps, how)
+        .map_err(|e| LogError::in_file(path.display(), e))
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.
@@ -54,11 +56,12 @@ pub fn open(
 pub fn of_bytes(
     bytes: Vec<u8>,
     format: Option<Format>,
+    layout: Option<&Layout>,
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     once(maps)?;
-    if let Some(layout) = how.layout {
+    if let Some(layout) = layout {
         return layout.read(&bytes, format, maps, how);
     }
     // Text files keep their own readers: those name lines, and tell a table from a trace by its looks.
