@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::divide::{FORTY, SIX, TWENTY_FOUR};
 use super::{ALIVE, Aligned};
-use haptic_sim::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Tracker};
+use haptic_sim::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Shape, Tracker};
 
 /// Steps of a search, of which one or two are the rule.
 const MOST_STEPS: usize = 4;
@@ -48,9 +48,9 @@ pub(super) const HEADING: u8 = 2;
 pub(super) const ALL: u8 = 7;
 const CURVATURE: u8 = 4;
 
-const STRAIGHT: u8 = 0;
-const ARC: u8 = 1;
-const CLOTHOID: u8 = 2;
+const STRAIGHT: u8 = Shape::Straight as u8;
+const ARC: u8 = Shape::Arc as u8;
+const CLOTHOID: u8 = Shape::Clothoid as u8;
 
 impl<const N: usize> Tracked<N> {
     pub(super) fn new() -> Self {
@@ -106,8 +106,7 @@ impl<const N: usize> Tracked<N> {
             return;
         };
         self.cell[lane] = index;
-        self.low[lane] = cell.s_m - cell.half_m;
-        self.high[lane] = cell.s_m + cell.half_m;
+        [self.low[lane], self.high[lane]] = cell.ends_m;
         self.middle[lane] = cell.s_m;
         (self.x[lane], self.y[lane]) = (cell.x_m, cell.y_m);
         [self.tangent_x[lane], self.tangent_y[lane]] = cell.tangent;
@@ -116,11 +115,7 @@ impl<const N: usize> Tracked<N> {
         self.curvature[lane] = cell.curvature_1pm + 0.0;
         self.slope[lane] = cell.curvature_slope_1pm2 + 0.0;
         [self.square_over_6[lane], self.cube[lane]] = cell.curvature_powers;
-        let shape = match (cell.curvature_slope_1pm2 != 0.0, cell.curvature_1pm != 0.0) {
-            (true, _) => CLOTHOID,
-            (false, true) => ARC,
-            (false, false) => STRAIGHT,
-        };
+        let shape = cell.shape as u8;
         if shape != self.shapes[lane] {
             self.shapes[lane] = shape;
             self.shape = self.shapes.iter().fold(STRAIGHT, |most, shape| most.max(*shape));
@@ -135,14 +130,7 @@ impl<const N: usize> Tracked<N> {
             if outside[lane] != ALIVE {
                 continue;
             }
-            let cells = roads[lane].cells();
-            let mut index = self.cell[lane];
-            while at[lane] > cells[index].s_m + cells[index].half_m && index + 1 < cells.len() {
-                index += 1;
-            }
-            while at[lane] < cells[index].s_m - cells[index].half_m && index > 0 {
-                index -= 1;
-            }
+            let index = roads[lane].walk(self.cell[lane], at[lane]);
             if index != self.cell[lane] {
                 self.enter(lane, &roads[lane], index);
             }

@@ -34,8 +34,8 @@ const KINK_M: f64 = 0.5;
 pub struct Cell {
     /// Arc length at the middle, m.
     pub s_m: f64,
-    /// Half the arc length, m.
-    pub half_m: f64,
+    /// Arc lengths of its start and its end, m.
+    pub ends_m: [f64; 2],
     /// Position of the middle, m.
     pub x_m: f64,
     /// See `x_m`.
@@ -50,6 +50,19 @@ pub struct Cell {
     pub curvature_slope_1pm2: f64,
     /// A sixth of the curvature's square, and its third power, which each projection needs.
     pub curvature_powers: [f64; 2],
+    /// Which of the terms vanish.
+    pub shape: Shape,
+}
+
+/// What a cell is: the less bent it is, the fewer terms its expansion has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// Without curvature.
+    Straight,
+    /// Of one curvature.
+    Arc,
+    /// Of a curvature that changes.
+    Clothoid,
 }
 
 /// A point in the frame of a place on the centreline.
@@ -65,14 +78,52 @@ struct Near {
 }
 
 impl Cell {
+    /// `middle` at an arc length of `s_m`, and what follows from a curvature, its slope and half a length.
+    fn new(s_m: f64, half_m: f64, middle: Pose, k: f64, slope: f64) -> Self {
+        Self {
+            s_m,
+            ends_m: [s_m - half_m, s_m + half_m],
+            x_m: middle.x_m,
+            y_m: middle.y_m,
+            tangent: [middle.heading_rad.cos(), middle.heading_rad.sin()],
+            heading_rad: middle.heading_rad,
+            curvature_1pm: k,
+            curvature_slope_1pm2: slope,
+            curvature_powers: [k * k / 6.0, k * k * k],
+            shape: match (slope != 0.0, k != 0.0) {
+                (true, _) => Shape::Clothoid,
+                (false, true) => Shape::Arc,
+                (false, false) => Shape::Straight,
+            },
+        }
+    }
+
+    /// Where a step of Newton's leads from an arc length, and how long it is, m; `None` close to the centre of curvature.
+    #[inline(always)]
+    fn newton(&self, s_m: f64, x_m: f64, y_m: f64) -> Option<(Projection, f64)> {
+        let near = self.near(s_m - self.s_m, x_m, y_m);
+        let determinant = 1.0 - near.curvature * near.offset_m;
+        if determinant.is_nan() || determinant < MIN_DETERMINANT {
+            return None;
+        }
+        let step = near.distance_to_foot / determinant;
+        let foot = Projection {
+            s_m: s_m + step,
+            offset_m: near.offset_m,
+            heading_rad: self.heading_rad + near.theta + near.curvature * step,
+            curvature_1pm: near.curvature,
+        };
+        Some((foot, step))
+    }
+
     /// The point `(x_m, y_m)` as the place at `sigma` behind the cell's middle sees it.
     #[inline]
     fn near(&self, sigma: f64, x_m: f64, y_m: f64) -> Near {
         let (k0, k1) = (self.curvature_1pm, self.curvature_slope_1pm2);
         let [tx, ty] = self.tangent;
         let (dx, dy) = (x_m - self.x_m, y_m - self.y_m);
-        if k0 == 0.0 && k1 == 0.0 {
-            // A straight: the expansion below without the terms that vanish, to the same bits. What is left of them
+        if self.shape == Shape::Straight {
+            // The expansion below without the terms that vanish, to the same bits. What is left of them
             // keeps the signs of zeros and lets nothing pass that is not a number.
             let (ahead, left) = (dx * tx + dy * ty - sigma, dy * tx - dx * ty);
             return Near {
@@ -85,8 +136,8 @@ impl Cell {
         // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
         let sigma2 = sigma * sigma;
         let [square_over_6, cube] = self.curvature_powers;
-        let (theta, along, across, curvature) = if k1 == 0.0 {
-            // An arc: without the terms that vanish, to the same bits.
+        let (theta, along, across, curvature) = if self.shape == Shape::Arc {
+            // Without the terms that vanish, to the same bits.
             let along = sigma - sigma2 * sigma * square_over_6;
             (sigma * k0, along, sigma2 * (0.5 * k0 - cube * sigma2 / 24.0), k0)
         } else {
@@ -104,11 +155,6 @@ impl Cell {
             offset_m: left * cos - ahead * sin,
         }
     }
-}
-
-/// What a projection needs of a curvature.
-fn powers(k: f64) -> [f64; 2] {
-    [k * k / 6.0, k * k * k]
 }
 
 /// What the surface is like in a cell: values at its middle and their change with arc length, per m.
@@ -154,6 +200,8 @@ pub struct Centreline {
     /// One for each cell; apart from them, because only some ask for it.
     grounds: Vec<Ground>,
     length_m: f64,
+    /// Largest arc length of a foot, m.
+    last_m: f64,
     lane_width_m: f64,
     /// Where the start is in the frame of the course's file.
     start: Pose,
@@ -200,17 +248,8 @@ impl Centreline {
         for piece in pieces {
             let half_m = 0.5 * piece.length_m;
             let middle = start.to_local(piece.middle);
-            cells.push(Cell {
-                s_m: s + half_m,
-                half_m,
-                x_m: middle.x_m,
-                y_m: middle.y_m,
-                tangent: [middle.heading_rad.cos(), middle.heading_rad.sin()],
-                heading_rad: middle.heading_rad,
-                curvature_1pm: piece.curvature_1pm,
-                curvature_slope_1pm2: piece.curvature_slope_1pm2,
-                curvature_powers: powers(piece.curvature_1pm),
-            });
+            let (curvature, slope) = (piece.curvature_1pm, piece.curvature_slope_1pm2);
+            cells.push(Cell::new(s + half_m, half_m, middle, curvature, slope));
             let ends = (piece.bank_rad, piece.grade, piece.width_m);
             grounds.push(Ground::within(half_m, piece.length_m, ends.0, ends.1, ends.2));
             s += piece.length_m;
@@ -219,6 +258,7 @@ impl Centreline {
             cells,
             grounds,
             length_m: s,
+            last_m: s + OVERRUN_M,
             lane_width_m: course.lane_width_m(),
             start,
             has_kinks: true,
@@ -250,17 +290,12 @@ impl Centreline {
                 let entry_curvature = curvature - slope * half_m;
                 let (dx, dy) = arc(heading, entry_curvature, slope, half_m);
                 let heading_mid = heading + (entry_curvature + 0.5 * slope * half_m) * half_m;
-                cells.push(Cell {
-                    s_m: s + middle,
-                    half_m,
+                let pose = Pose {
                     x_m: x + dx,
                     y_m: y + dy,
-                    tangent: [heading_mid.cos(), heading_mid.sin()],
                     heading_rad: heading_mid,
-                    curvature_1pm: curvature,
-                    curvature_slope_1pm2: slope,
-                    curvature_powers: powers(curvature),
-                });
+                };
+                cells.push(Cell::new(s + middle, half_m, pose, curvature, slope));
                 grounds.push(Ground::within(middle, length_m, bank_rad, grade, width_m));
                 let (dx2, dy2) = arc(heading_mid, curvature, slope, half_m);
                 (x, y) = (x + dx + dx2, y + dy + dy2);
@@ -272,6 +307,7 @@ impl Centreline {
             cells,
             grounds,
             length_m: s,
+            last_m: s + OVERRUN_M,
             lane_width_m: course.lane_width_m(),
             start: Pose::default(),
             has_kinks: false,
@@ -289,7 +325,7 @@ impl Centreline {
         let cell = &self.cells[index];
         let sigma = s_m - cell.s_m;
         let piece = Piece {
-            length_m: 2.0 * cell.half_m,
+            length_m: cell.ends_m[1] - cell.ends_m[0],
             middle: Pose {
                 x_m: cell.x_m,
                 y_m: cell.y_m,
@@ -329,7 +365,7 @@ impl Centreline {
     pub fn tracker(&self, s_m: f64) -> Tracker {
         let cell = self
             .cells
-            .partition_point(|c| c.s_m + c.half_m < s_m)
+            .partition_point(|c| c.ends_m[1] < s_m)
             .min(self.cells.len() - 1);
         Tracker {
             cell,
@@ -343,50 +379,59 @@ impl Centreline {
     /// to the centre of curvature.
     #[inline]
     pub fn project(&self, x_m: f64, y_m: f64, tracker: &mut Tracker) -> Option<Projection> {
-        let mut s = tracker.s_m + tracker.advance_m;
+        let s = tracker.s_m + tracker.advance_m;
+        let cell = &self.cells[tracker.cell];
+        if s > cell.ends_m[1] || s < cell.ends_m[0] {
+            return self.search(x_m, y_m, s, tracker, MAX_NEWTON_STEPS);
+        }
+        // Mostly the first step, in the cell of the time before, finds the foot.
+        let (foot, step) = cell.newton(s, x_m, y_m)?;
+        if step.abs() < CONVERGED_M {
+            return self.take(foot, tracker.cell, tracker);
+        }
+        let s = foot.s_m.clamp(-OVERRUN_M, self.last_m);
+        self.search(x_m, y_m, s, tracker, MAX_NEWTON_STEPS - 1)
+    }
+
+    /// Searches from an arc length on, in so many steps at most. Compiled apart, as a loop takes registers.
+    #[inline(never)]
+    fn search(&self, x_m: f64, y_m: f64, s: f64, tracker: &mut Tracker, steps: usize) -> Option<Projection> {
+        let mut s = s;
         let mut index = tracker.cell;
-        for iteration in 1..=MAX_NEWTON_STEPS {
-            let mut cell = &self.cells[index];
-            while s > cell.s_m + cell.half_m && index + 1 < self.cells.len() {
-                index += 1;
-                cell = &self.cells[index];
-            }
-            while s < cell.s_m - cell.half_m && index > 0 {
-                index -= 1;
-                cell = &self.cells[index];
-            }
-            let Near {
-                theta,
-                curvature,
-                distance_to_foot,
-                offset_m,
-            } = cell.near(s - cell.s_m, x_m, y_m);
-            let determinant = 1.0 - curvature * offset_m;
-            if determinant.is_nan() || determinant < MIN_DETERMINANT {
-                return None;
-            }
-            let step = distance_to_foot / determinant;
-            s += step;
-            let at_kink = iteration == MAX_NEWTON_STEPS && self.has_kinks && step.abs() < KINK_M;
+        for left in (0..steps).rev() {
+            index = self.walk(index, s);
+            let (foot, step) = self.cells[index].newton(s, x_m, y_m)?;
+            let at_kink = left == 0 && self.has_kinks && step.abs() < KINK_M;
             if step.abs() < CONVERGED_M || at_kink {
-                if s < -OVERRUN_M || s > self.length_m + OVERRUN_M {
-                    return None;
-                }
-                *tracker = Tracker {
-                    cell: index,
-                    s_m: s,
-                    advance_m: s - tracker.s_m,
-                };
-                return Some(Projection {
-                    s_m: s,
-                    offset_m,
-                    heading_rad: cell.heading_rad + theta + curvature * step,
-                    curvature_1pm: curvature,
-                });
+                return self.take(foot, index, tracker);
             }
-            s = s.clamp(-OVERRUN_M, self.length_m + OVERRUN_M);
+            s = foot.s_m.clamp(-OVERRUN_M, self.last_m);
         }
         None
+    }
+
+    /// The cell of an arc length, looked for from a cell nearby.
+    #[inline]
+    pub fn walk(&self, mut index: usize, s_m: f64) -> usize {
+        while s_m > self.cells[index].ends_m[1] && index + 1 < self.cells.len() {
+            index += 1;
+        }
+        while s_m < self.cells[index].ends_m[0] && index > 0 {
+            index -= 1;
+        }
+        index
+    }
+
+    /// A foot that was found, unless it lies beyond the ends.
+    #[inline]
+    fn take(&self, foot: Projection, cell: usize, tracker: &mut Tracker) -> Option<Projection> {
+        let s_m = foot.s_m;
+        if s_m < -OVERRUN_M || s_m > self.last_m {
+            return None;
+        }
+        let advance_m = s_m - tracker.s_m;
+        *tracker = Tracker { cell, s_m, advance_m };
+        Some(foot)
     }
 }
 
