@@ -132,14 +132,8 @@ impl DriverVehicle for PaperPair {
                 acting.guidance_torque_nm
             }
             Some(plant) => {
-                let speeds = acting.speed_m_per_s;
-                plant.step(
-                    &mut self.plant,
-                    speeds,
-                    transition.gains(),
-                    &input,
-                    acting.bank_rad,
-                );
+                let (speeds, gains) = (acting.speed_m_per_s, transition.gains());
+                plant.step(&mut self.plant, speeds, gains, input, acting.bank_rad);
                 plant.motor_torque_nm()
             }
         };

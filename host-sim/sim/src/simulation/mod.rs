@@ -25,7 +25,7 @@ use std::sync::Arc;
 use haptic_log::trace::Sample;
 
 use crate::action::{Action, WorldFaults};
-use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation, Status};
+use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation};
 use crate::models::STEP_S;
 use crate::models::road::{Centreline, Tracker};
 use crate::parts::{Acting, Driver, DriverVehicle, DriverView, Motion, PaperPair, Parts, Vehicle};
@@ -61,7 +61,8 @@ pub struct Simulation<G = AnyGuidance, S = PaperPair> {
     /// The run ends when the driver's far point gets there.
     end_m: f64,
     watch: Watch,
-    told: Status,
+    /// Whether the driver is warned, and asked for hands.
+    told: [bool; 2],
     last_s_m: f64,
     lateral_error_m: Option<f64>,
     step: u32,
@@ -111,7 +112,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             camera: PreviewPoints::new(&road, camera_s, v),
             body: road.tracker(0.0),
             watch: Watch::default(),
-            told: Status::GUIDES,
+            told: [false; 2],
             last_s_m: 0.0,
             lateral_error_m: None,
             step: 0,
@@ -146,8 +147,8 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             speed_m_per_s: self.speed_m_per_s,
             yaw_rate_rad_per_s: motion.yaw_rate_rad_per_s,
             guidance_torque_nm: self.driver_vehicle.motor_torque_nm(),
-            warning: self.told.warning,
-            asks_for_hands: self.told.asks_for_hands(),
+            warning: self.told[0],
+            asks_for_hands: self.told[1],
             is_lost: lost.any(),
         }
     }
@@ -192,16 +193,14 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             yaw_rate_rad_per_s: Some(motion.yaw_rate_rad_per_s),
             request: self.plan.request(action, self.request.asks),
         };
-        let seen = match &mut self.sensing {
-            None => observation,
-            Some(sensing) => sensing.of_truth(&observation),
-        };
+        let sensing = self.sensing.as_mut();
+        let seen = sensing.map_or(observation, |sensing| sensing.of_truth(&observation));
         let decided = self.guidance.step(&seen);
         let status = self.guidance.status();
         if let Some(status) = &status {
             self.watch
                 .step(status, self.circumstances(action, faults, seen.speed_m_per_s));
-            self.told = *status;
+            self.told = [status.warning, status.asks_for_hands()];
             self.request.see(view.is_lost, status.mode);
         }
         let applied = if faults.torque_lost {

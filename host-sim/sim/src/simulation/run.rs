@@ -87,7 +87,9 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
         };
         while let Some(outcome) = self.step(&Action::default()) {
             observe(&outcome);
-            trace.samples.extend(outcome.sample);
+            if let Some(sample) = outcome.sample {
+                trace.samples.push(sample);
+            }
         }
         Run {
             trace,

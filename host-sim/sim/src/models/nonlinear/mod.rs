@@ -87,14 +87,14 @@ impl NonlinearPlant {
         plant: &mut Plant,
         v_m_per_s: [f64; 2],
         gains: ArmGains,
-        input: &PlantInput,
+        input: PlantInput,
         bank_rad: f64,
     ) {
         let [force_n, moment_nm] = self.wind.step();
         let held = Held {
             v_m_per_s,
             gains,
-            input: *input,
+            input,
             surroundings: Surroundings {
                 mu: self.world.mu,
                 bank_rad: bank_rad + self.world.bank_rad,

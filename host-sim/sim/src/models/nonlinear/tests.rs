@@ -21,7 +21,7 @@ fn largest_difference(world: WorldParameters, target_rad: f64) -> [f64; 5] {
             remnant_nm: 0.0,
         };
         linear.step(&transition, &input);
-        nonlinear.step(&mut plant, [V; 2], gains, &input, 0.0);
+        nonlinear.step(&mut plant, [V; 2], gains, input, 0.0);
         let [a, b] = [&linear, &plant].map(Plant::state);
         let pairs = [
             [a.sideslip_rad, b.sideslip_rad],
@@ -77,7 +77,7 @@ fn steady(world: WorldParameters, lateral_m_per_s2: f64, v: f64, gains: ArmGains
             remnant_nm,
             ..PlantInput::default()
         };
-        nonlinear.step(&mut plant, [v; 2], gains, &input, bank);
+        nonlinear.step(&mut plant, [v; 2], gains, input, bank);
     }
     plant.state()
 }
@@ -131,7 +131,7 @@ fn friction_holds_the_wheel_until_it_is_overcome() {
                 guidance_torque_nm: torque_nm * (f64::from(step) / 4000.0).min(1.0),
                 ..PlantInput::default()
             };
-            nonlinear.step(&mut plant, [V; 2], ArmGains { k_d: 0.0, k_hg: 0.0 }, &input, 0.0);
+            nonlinear.step(&mut plant, [V; 2], ArmGains { k_d: 0.0, k_hg: 0.0 }, input, 0.0);
         }
         plant.state().wheel_rad.to_degrees()
     };
@@ -275,7 +275,7 @@ fn under_braking_a_step_is_as_exact_as_a_fine_runge_kutta() {
             guidance_torque_nm: t_h,
             remnant_nm: 0.0,
         };
-        nonlinear.step(&mut plant, [speed(from), speed(to)], gains, &input, 0.0);
+        nonlinear.step(&mut plant, [speed(from), speed(to)], gains, input, 0.0);
         let h = STEP_S / 10.0;
         for i in 0..10_u32 {
             x = runge_kutta(&x, h, |x, part| {
