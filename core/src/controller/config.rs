@@ -13,7 +13,7 @@
 
 mod monitor;
 
-use crate::controller::params::{DRIVER_ACTIVITY, FDCA, LAWS, ParamError, Params, in_range};
+use crate::controller::params::{DRIVER_ACTIVITY, FDCA, LAWS, ParamError, Params, WHOLE, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
 use crate::law::activity::{LeastShare, TimeAndShare};
@@ -86,7 +86,7 @@ impl Config {
                 value: p.law,
                 min: 0.0,
                 max: (LAWS.len() - 1) as f64,
-                unit: "in whole numbers",
+                unit: WHOLE,
             });
         }
         let slope = 2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz;
