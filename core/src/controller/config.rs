@@ -282,6 +282,27 @@ mod tests {
         }
     }
 
+    /// The longest look-ahead, 3 s, and lambda_min share a word; only driver activity has a lambda_min, also one of zero.
+    #[test]
+    fn time_and_least_share_share_a_word() {
+        for (law, lambda_min, share) in [
+            (0.0, 1.0, None),
+            (1.0, 0.0, Some(0.0)),
+            (1.0, 1.0, Some(1.0)),
+            (2.0, 1.0, None),
+        ] {
+            let mut params = Params {
+                law,
+                activity_lambda_min: lambda_min,
+                ..Params::PAPER
+            };
+            (params.vehicle.far_time_s, params.vehicle.near_time_s) = (3.0, 0.0);
+            let between = Config::new(&params).unwrap().plausibility.between;
+            assert_eq!(between.time(), Micros::from_us(3_000_000));
+            assert_eq!(between.least_share(), share.map(LeastShare::from_si), "{law}");
+        }
+    }
+
     /// Worked out apart from this program. No two parameters that could take each other's place are alike.
     #[test]
     fn each_parameter_reaches_monitor_and_estimator() {
