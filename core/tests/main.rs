@@ -24,6 +24,7 @@ mod long_message;
 mod memory;
 mod modes;
 mod monitor;
+mod monitor_fdca;
 mod motor;
 mod onward;
 mod params;

@@ -6,18 +6,18 @@ use haptic_core::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState
 use haptic_core::safety::redundant::Redundant;
 
 const STANDBY: u64 = 1;
-const ACTIVE: u64 = 2;
-const FADE: u64 = 3;
+pub(crate) const ACTIVE: u64 = 2;
+pub(crate) const FADE: u64 = 3;
 const HANDOVER: u64 = 4;
 
 /// Torque in 2^-12 N.m, from bit 12; mode from bit 32.
-fn guidance(torque: i64, mode: u64) -> [u8; 8] {
+pub(crate) fn guidance(torque: i64, mode: u64) -> [u8; 8] {
     (((torque as u64) & 0xFFFF) << 12 | mode << 32).to_le_bytes()
 }
 
 /// e_y in 2^-13 m from bit 12, e_theta in 2^-16 rad from bit 29, age in 0.1 ms from bit 46, valid bit 55, and how often 512 come to
 /// the age from bit 56.
-fn lane(e_y: i64, e_theta: i64, age: u64) -> [u8; 8] {
+pub(crate) fn lane(e_y: i64, e_theta: i64, age: u64) -> [u8; 8] {
     let word = ((e_y as u64) & 0x1_FFFF) << 12
         | ((e_theta as u64) & 0x1_FFFF) << 29
         | (age & 0x1FF) << 46
@@ -46,9 +46,9 @@ fn unused() -> Redundant<Fdca> {
 
 /// A monitor with what it remembers.
 #[derive(Clone, Copy)]
-struct Bench {
+pub(crate) struct Bench {
     monitor: Monitor,
-    state: MonitorState,
+    pub(crate) state: MonitorState,
 }
 
 impl Bench {
@@ -89,7 +89,7 @@ impl Bench {
     }
 
     /// Brought to a torque, and then without a lane for long enough that it is forgotten.
-    fn at(limit_nm: f64, torque: i64) -> Self {
+    pub(crate) fn at(limit_nm: f64, torque: i64) -> Self {
         let mut bench = Self::new(limit_nm);
         let mut now = 0;
         while now != torque {
@@ -105,7 +105,7 @@ impl Bench {
 }
 
 /// Counts of 2^-12 N.m that make so many mN.m when cut to whole ones: the smallest, and the largest.
-fn counts(mnm: i64) -> (i64, i64) {
+pub(crate) fn counts(mnm: i64) -> (i64, i64) {
     let at_least = |mnm: i64| (mnm * 4096 + 999) / 1000;
     let (small, large) = (at_least(mnm.abs()), at_least(mnm.abs() + 1) - 1);
     (mnm.signum() * small, if mnm < 0 { -large } else { large })

@@ -13,7 +13,7 @@
 
 mod monitor;
 
-use crate::controller::params::{DRIVER_ACTIVITY, FDCA, LAWS, ParamError, Params, in_range};
+use crate::controller::params::{DRIVER_ACTIVITY, FDCA, LAWS, ParamError, Params, WHOLE, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
 use crate::law::activity::{LeastShare, TimeAndShare};
@@ -86,7 +86,7 @@ impl Config {
                 value: p.law,
                 min: 0.0,
                 max: (LAWS.len() - 1) as f64,
-                unit: "in whole numbers",
+                unit: WHOLE,
             });
         }
         let slope = 2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz;
@@ -279,6 +279,27 @@ mod tests {
             let config = Config::new(&params).unwrap();
             assert_eq!(config.plausibility.between.time(), Micros::from_us(between_us));
             assert_eq!(config.law.tau, tau, "{rate_corner_hz}");
+        }
+    }
+
+    /// The longest look-ahead, 3 s, and lambda_min share a word; only driver activity has a lambda_min, also one of zero.
+    #[test]
+    fn time_and_least_share_share_a_word() {
+        for (law, lambda_min, share) in [
+            (0.0, 1.0, None),
+            (1.0, 0.0, Some(0.0)),
+            (1.0, 1.0, Some(1.0)),
+            (2.0, 1.0, None),
+        ] {
+            let mut params = Params {
+                law,
+                activity_lambda_min: lambda_min,
+                ..Params::PAPER
+            };
+            (params.vehicle.far_time_s, params.vehicle.near_time_s) = (3.0, 0.0);
+            let between = Config::new(&params).unwrap().plausibility.between;
+            assert_eq!(between.time(), Micros::from_us(3_000_000));
+            assert_eq!(between.least_share(), share.map(LeastShare::from_si), "{law}");
         }
     }
 

@@ -43,6 +43,9 @@ pub const DRIVER_ACTIVITY: f64 = 1.0;
 /// [`Params::law`] of four design choices.
 pub const FDCA: f64 = 2.0;
 
+/// [`ParamError::unit`] where a parameter is in its range and no whole number, as it has to be.
+pub const WHOLE: &str = "in whole numbers";
+
 /// Declares the parameters: `field: unit, least to largest, default;`, a group of those that belong together, and more. New
 /// ones come last, so that none changes its number.
 macro_rules! parameters {
@@ -210,7 +213,7 @@ pub struct ParamError {
     pub min: f64,
     /// Largest allowed value.
     pub max: f64,
-    /// SI unit of all three.
+    /// SI unit of all three, or [`WHOLE`].
     pub unit: &'static str,
 }
 

@@ -1,10 +1,12 @@
 //! Values outside their range.
 
+use std::fmt;
 use std::ops::RangeInclusive;
 
+use haptic_core::controller::params::WHOLE;
+
 /// A value outside its range, or NaN.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{field} = {value}{space}{unit} is outside {min} to {max}{space}{unit}", space = if unit.is_empty() { "" } else { " " })]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RangeError {
     /// The field, with the table that it is in.
     pub field: String,
@@ -14,9 +16,28 @@ pub struct RangeError {
     pub min: f64,
     /// The largest value allowed.
     pub max: f64,
-    /// The unit of all three; empty for a number without one.
+    /// The unit of all three; empty for a number without one; [`WHOLE`] where only whole numbers are in the range.
     pub unit: &'static str,
 }
+
+impl fmt::Display for RangeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            field,
+            value,
+            min,
+            max,
+            unit,
+        } = self;
+        match *unit {
+            WHOLE => write!(f, "{field} = {value} is not a whole number from {min} to {max}"),
+            "" => write!(f, "{field} = {value} is outside {min} to {max}"),
+            unit => write!(f, "{field} = {value} {unit} is outside {min} to {max} {unit}"),
+        }
+    }
+}
+
+impl std::error::Error for RangeError {}
 
 impl RangeError {
     /// The same of a field in a table.

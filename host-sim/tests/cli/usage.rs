@@ -13,11 +13,12 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("manual.toml", "condition = 'manual'\n");
     write("exact.toml", "sensors = 'exact'\n");
     write("late.toml", "[failure]\nkind = 'torque'\ntime_s = 5000\n");
+    write("between.toml", "[guidance]\nlaw = 1.5\n");
     write("empty.toml", "");
     write("course.toml", "[[segment]]\nlength_m = 500\n");
     write("on-a-tight-road.toml", "course = 'tight.toml'\n");
     write("notes.txt", "of somebody");
-    let cases: [(&[&str], &str); 30] = [
+    let cases: [(&[&str], &str); 31] = [
         (
             &["run", "on-a-tight-road.toml"],
             "on-a-tight-road.toml: course: tight.toml: ",
@@ -95,6 +96,10 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         (&["ecu", "pil", "exact.toml"], "exact.toml: sensors = \"exact\""),
         (&["evaluate", "--sensors", "perfect"], "perfect"),
         (&["run", "unknown.toml"], "t_q"),
+        (
+            &["ecu", "parameters", "between.toml", "--can", "can0"],
+            "between.toml: guidance.law = 1.5 is not a whole number from 0 to 2",
+        ),
         (
             &["ecu", "pil", "manual.toml"],
             "manual.toml: condition = \"manual\"",
