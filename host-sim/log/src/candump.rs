@@ -47,12 +47,9 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, RecordingError> {
         let Some((time, rest)) = content.strip_prefix('(').and_then(|c| c.split_once(')')) else {
             return Err(refuse("no time stamp; record with candump -L"));
         };
-        let time_s: f64 = time
-            .trim()
-            .parse()
-            .ok()
-            .filter(|t: &f64| t.is_finite())
-            .ok_or_else(|| refuse("the time stamp is no number of seconds; record with candump -L"))?;
+        let time_s = time.trim().parse().ok().filter(|t: &f64| t.is_finite());
+        let time_s =
+            time_s.ok_or_else(|| refuse("the time stamp is no number of seconds; record with candump -L"))?;
         let mut words = rest.split_whitespace().skip(1).peekable();
         let Some(first) = words.next() else {
             return Err(refuse("no frame"));
@@ -96,8 +93,7 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, RecordingError> {
 /// # Errors
 /// What `out` says.
 pub fn write(out: &mut (impl Write + ?Sized), time_s: f64, id: u16, data: &[u8]) -> io::Result<()> {
-    write!(out, "({time_s:.6}) can0 {id:03X}#")?;
-    end(out, data)
+    write_line(out, time_s, (id.into(), 3), data)
 }
 
 /// Writes a frame, its identifier with eight digits if it has 29 bits.
@@ -105,16 +101,17 @@ pub fn write(out: &mut (impl Write + ?Sized), time_s: f64, id: u16, data: &[u8])
 /// # Errors
 /// What `out` says.
 pub fn write_frame(out: &mut (impl Write + ?Sized), frame: &CandumpFrame) -> io::Result<()> {
-    let (time_s, id) = (frame.time_s, frame.id);
-    if frame.extended {
-        write!(out, "({time_s:.6}) can0 {id:08X}#")?;
-    } else {
-        write!(out, "({time_s:.6}) can0 {id:03X}#")?;
-    }
-    end(out, &frame.data)
+    let digits = if frame.extended { 8 } else { 3 };
+    write_line(out, frame.time_s, (frame.id, digits), &frame.data)
 }
 
-fn end(out: &mut (impl Write + ?Sized), data: &[u8]) -> io::Result<()> {
+fn write_line(
+    out: &mut (impl Write + ?Sized),
+    time_s: f64,
+    (id, digits): (u32, usize),
+    data: &[u8],
+) -> io::Result<()> {
+    write!(out, "({time_s:.6}) can0 {id:0digits$X}#")?;
     for byte in data {
         write!(out, "{byte:02X}")?;
     }

@@ -86,11 +86,9 @@ impl TableReader {
     /// # Errors
     /// What cannot be read.
     pub fn new(mut source: impl Read) -> Result<Self, TableError> {
-        let unreadable = |what: String| TableError::Unreadable(what);
         let mut bytes = Vec::new();
-        source
-            .read_to_end(&mut bytes)
-            .map_err(|e| unreadable(e.to_string()))?;
+        let read = source.read_to_end(&mut bytes);
+        read.map_err(|e| TableError::Unreadable(e.to_string()))?;
         let text = String::from_utf8_lossy(&bytes);
         let (lines, kept): (Vec<u64>, Vec<&str>) = (1..)
             .zip(text.trim_start_matches('\u{feff}').lines())
@@ -104,7 +102,8 @@ impl TableReader {
             .trim(csv::Trim::All)
             .flexible(true)
             .from_reader(Cursor::new(kept.join("\n")));
-        let header = reader.headers().map_err(|e| unreadable(e.to_string()))?;
+        let header = reader.headers();
+        let header = header.map_err(|e| TableError::Unreadable(e.to_string()))?;
         Ok(Self {
             header: header.iter().map(str::to_owned).collect(),
             header_line: lines.next().unwrap_or(1),
@@ -128,24 +127,19 @@ impl TableReader {
     /// The rows, in order; all have as many fields as the heading.
     pub fn rows(&mut self) -> impl Iterator<Item = Result<Row, TableError>> {
         let expected = self.header.len();
-        self.reader
-            .records()
-            .zip(self.lines.by_ref())
-            .map(move |(record, line)| {
-                let fields = record.map_err(|e| TableError::Row {
+        let row = move |(record, line): (Result<csv::StringRecord, csv::Error>, u64)| {
+            let unreadable = |what: String| TableError::Row { line, what };
+            let fields = record.map_err(|e| unreadable(e.to_string()))?;
+            match fields.len() {
+                found if found == expected => Ok(Row { line, fields }),
+                found => Err(TableError::Fields {
                     line,
-                    what: e.to_string(),
-                })?;
-                if fields.len() == expected {
-                    Ok(Row { line, fields })
-                } else {
-                    Err(TableError::Fields {
-                        line,
-                        found: fields.len(),
-                        expected,
-                    })
-                }
-            })
+                    found,
+                    expected,
+                }),
+            }
+        };
+        self.reader.records().zip(self.lines.by_ref()).map(row)
     }
 }
 

@@ -60,27 +60,18 @@ pub struct Channel {
     set: fn(&mut Sample, f64),
 }
 
-/// A quantity or a flag, as a number.
-trait Value: Copy {
-    fn number(self) -> f64;
+/// A quantity or a flag, of a number.
+trait Value {
     fn from_number(number: f64) -> Self;
 }
 
 impl Value for f64 {
-    fn number(self) -> f64 {
-        self
-    }
-
     fn from_number(number: f64) -> Self {
         number
     }
 }
 
 impl Value for bool {
-    fn number(self) -> f64 {
-        f64::from(self)
-    }
-
     fn from_number(number: f64) -> Self {
         number != 0.0
     }
@@ -103,7 +94,7 @@ macro_rules! channels {
                 decimals: $decimals,
                 source: Source::$source,
                 meaning: concat!($($meaning),+),
-                value: |sample| sample.$field.number(),
+                value: |sample| f64::from(sample.$field),
                 set: |sample, number| sample.$field = Value::from_number(number),
             },)*
         ];
@@ -172,13 +163,9 @@ impl Trace {
     pub fn write_csv(&self, out: impl Write) -> io::Result<()> {
         let mut table = TableWriter::new(out, CHANNELS.map(|channel| channel.name))?;
         for sample in &self.samples {
-            table.row(CHANNELS.map(|channel| {
-                let value = (channel.value)(sample);
-                if value.is_finite() {
-                    fixed(value, channel.decimals)
-                } else {
-                    String::new()
-                }
+            table.row(CHANNELS.map(|channel| match (channel.value)(sample) {
+                value if value.is_finite() => fixed(value, channel.decimals),
+                _ => String::new(),
             }))?;
         }
         table.finish()
@@ -228,16 +215,14 @@ impl Trace {
             }
             samples.push(sample);
         }
-        let span_s = samples
-            .last()
-            .zip(samples.first())
-            .map_or(0.0, |(b, a)| b.time_s - a.time_s);
+        let ends = samples.last().zip(samples.first());
+        let span_s = ends.map_or(0.0, |(b, a)| b.time_s - a.time_s);
+        let sample_rate_hz = match span_s > 0.0 {
+            true => (samples.len() - 1) as f64 / span_s,
+            false => 0.0,
+        };
         Ok(Self {
-            sample_rate_hz: if span_s > 0.0 {
-                (samples.len() - 1) as f64 / span_s
-            } else {
-                0.0
-            },
+            sample_rate_hz,
             samples,
         })
     }
@@ -248,13 +233,10 @@ impl Trace {
 pub fn table_of_channels() -> String {
     let mut text = String::from("| column | unit | digits | of | meaning |\n|---|---|---|---|---|\n");
     for channel in CHANNELS {
+        let (name, unit, digits, source) = (channel.name, channel.unit, channel.decimals, channel.source);
+        let meaning = channel.meaning.trim();
         text.push_str(&format!(
-            "| `{}` | {} | {} | {} | {} |\n",
-            channel.name,
-            channel.unit,
-            channel.decimals,
-            channel.source,
-            channel.meaning.trim()
+            "| `{name}` | {unit} | {digits} | {source} | {meaning} |\n"
         ));
     }
     text

@@ -2,7 +2,7 @@
 
 use haptic_batch::adaptation::Adaptation;
 use haptic_batch::compare::Kinds;
-use haptic_report::document::write_file;
+use haptic_report::document::write_bytes;
 use haptic_report::studies::adaptation::report;
 
 use super::results::StudyFile;
@@ -19,9 +19,7 @@ pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
         arguments.threads.run(|| study.run(done))
     })??;
     if let Some(place) = output.place() {
-        let series = results.to_csv();
-        write_file(&place.join("loops.csv"), |file| file.write_all(series.as_bytes()))?;
+        write_bytes(&place.join("loops.csv"), results.to_csv())?;
     }
-    let report = report(&results);
-    output.show(&report, &report.stamp(&results), true)
+    output.show(&report(&results), &results, true)
 }

@@ -64,41 +64,36 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             (Some(checkpoint), segments)
         }
     };
-    let bar = progress::bar(plan.segments().len() as u64, "drives of five minutes");
-    bar.inc(
-        plan.segments()
-            .iter()
-            .filter(|number| on_record.iter().any(|segment| segment.is(number)))
-            .count() as u64,
-    );
+    let (segments, bar) = (plan.segments(), "drives of five minutes");
+    let bar = progress::bar(segments.len() as u64, bar);
+    let known = segments
+        .iter()
+        .filter(|number| on_record.iter().any(|segment| segment.is(number)));
+    bar.inc(known.count() as u64);
     let results = study(&plan, &on_record, |segment| {
         bar.inc(1);
-        checkpoint
-            .as_ref()
-            .map_or(Ok(()), |checkpoint| Ok(checkpoint.add(segment)?))
+        let kept = checkpoint.as_ref().map(|checkpoint| checkpoint.add(segment));
+        Ok(kept.transpose().map(drop)?)
     })?;
     bar.finish_and_clear();
     let results = Balance {
         detection: detection(&plan, arguments.fault_seeds),
         availability: results,
     };
-    let report = report(&results);
     let too_many = |most: f64| {
         let judged = results.availability.judged();
         let mut bounds = judged.map(|cell| cell.declarations.upper_95);
         bounds.any(|upper| upper > most || upper.is_nan())
     };
     let holds = !arguments.max_rate.is_some_and(too_many);
-    output.show(&report, &report.stamp(&results), holds)
+    output.show(&report(&results), &results, holds)
 }
 
 /// The checkpoint's name, if it lies in the directory of the results.
 fn kept_in<'a>(directory: Option<&Path>, checkpoint: Option<&'a Path>) -> Vec<&'a str> {
     let within = checkpoint.filter(|path| directory.is_some() && path.parent() == directory);
-    within
-        .and_then(|path| path.file_name()?.to_str())
-        .into_iter()
-        .collect()
+    let name = within.and_then(|path| path.file_name()?.to_str());
+    name.into_iter().collect()
 }
 
 fn plan(arguments: &Arguments) -> Result<AvailabilityPlan, BadInput> {
@@ -106,34 +101,28 @@ fn plan(arguments: &Arguments) -> Result<AvailabilityPlan, BadInput> {
         let message = format!("--hours: {} is outside 0 to 100000 h", arguments.hours);
         return Err(BadInput(message));
     }
-    let unknown = |option: &str, name: &str, all: String| {
-        BadInput(format!("{option}: there is no {name}; there are {all}"))
-    };
-    let worlds = chosen(&arguments.worlds, &WORLDS, |c| c.name)
-        .map_err(|(name, all)| unknown("--worlds", &name, all))?;
-    let roads =
-        chosen(&arguments.roads, &ROADS, |r| r.name).map_err(|(name, all)| unknown("--roads", &name, all))?;
     Ok(AvailabilityPlan {
-        worlds,
-        roads,
+        worlds: chosen("--worlds", &arguments.worlds, &WORLDS, |c| c.name)?,
+        roads: chosen("--roads", &arguments.roads, &ROADS, |r| r.name)?,
         hours: arguments.hours,
         seed: arguments.seed,
         only: arguments.drives.clone(),
     })
 }
 
-/// Those of the names, all if there is none; or the first that is not there, and what there is.
-fn chosen<T>(
+/// Those of the names, all if there is none.
+pub(super) fn chosen<T>(
+    option: &str,
     names: &[String],
     all: &'static [T],
     name_of: fn(&T) -> &'static str,
-) -> Result<Vec<&'static T>, (String, String)> {
-    if let Some(name) = names
-        .iter()
-        .find(|name| !all.iter().any(|one| name_of(one) == name.as_str()))
-    {
-        let known: Vec<&str> = all.iter().map(name_of).collect();
-        return Err((name.clone(), known.join(", ")));
+) -> Result<Vec<&'static T>, BadInput> {
+    let known: Vec<&str> = all.iter().map(name_of).collect();
+    if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
+        let known = known.join(", ");
+        return Err(BadInput(format!(
+            "{option}: there is no {name}; there are {known}"
+        )));
     }
     let wanted = |one: &&'static T| names.is_empty() || names.iter().any(|name| name == name_of(one));
     Ok(all.iter().filter(wanted).collect())

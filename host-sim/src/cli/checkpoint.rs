@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::BadInput;
+use super::{BadInput, in_file};
 
 /// A file of parts.
 pub(super) struct Checkpoint {
@@ -25,7 +25,7 @@ impl Checkpoint {
     /// # Errors
     /// Another study's file, or one that cannot be read or written.
     pub(super) fn open<T: DeserializeOwned>(path: &Path, heading: &str) -> Result<(Self, Vec<T>), BadInput> {
-        let fail = |e: &dyn std::fmt::Display| BadInput(format!("{}: {e}", path.display()));
+        let fail = |e: &dyn std::fmt::Display| in_file(path)(e);
         let text = match std::fs::read_to_string(path) {
             Ok(text) => text,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),

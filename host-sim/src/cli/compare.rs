@@ -1,7 +1,7 @@
 //! `host-sim compare FILE.toml`.
 
 use haptic_batch::compare::{Compare, Kinds};
-use haptic_report::document::write_file;
+use haptic_report::document::write_bytes;
 use haptic_report::studies::compare::report;
 
 use super::results::StudyFile;
@@ -19,10 +19,8 @@ pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
         arguments.threads.run(|| compare.run(done))
     })??;
     if let Some(place) = output.place() {
-        let table = results.to_csv();
-        write_file(&place.join("drives.csv"), |file| file.write_all(table.as_bytes()))?;
+        write_bytes(&place.join("drives.csv"), results.to_csv())?;
         results.write_parquet(std::fs::File::create(place.join("drives.parquet"))?)?;
     }
-    let report = report(&results);
-    output.show(&report, &report.stamp(&results), true)
+    output.show(&report(&results), &results, true)
 }

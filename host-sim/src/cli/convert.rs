@@ -9,7 +9,7 @@ use haptic_log::recording::{Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
-use super::{BadInput, Outcome, output, print, print_json, width};
+use super::{BadInput, Outcome, in_file, output, print, print_json, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -48,16 +48,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(rate_hz) = arguments.rate.filter(|rate| !(0.1..=1e5).contains(rate)) {
         return Err(format!("--rate {rate_hz}: 0.1 to 100000 Hz is wanted").into());
     }
-    if let Some(output) = arguments
-        .output
-        .as_ref()
-        .filter(|file| file.exists() && !output::is_forced())
+    if let Some(output) = &arguments.output
+        && output.exists()
+        && !output::is_forced()
     {
-        return Err(format!(
-            "{}: the file is there already; --force writes over it",
-            output.display()
-        )
-        .into());
+        return Err(in_file(output)(
+            "the file is there already; --force writes over it",
+        ));
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
     let contents = formats::read(&arguments.input, time.as_ref())?;
@@ -71,22 +68,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         eprintln!("{}: {} frames", output.display(), frames.len());
         return Ok(Outcome::Good);
     }
-    let named = |e: RecordingError| BadInput(format!("{}: {e}", arguments.input.display()));
+    let named = in_file::<RecordingError>(&arguments.input);
     let mut recording = match contents {
         Contents::Channels(recording) => recording,
         Contents::Frames(frames) => {
             let dbc = match &arguments.dbc {
-                Some(path) => {
-                    std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?
-                }
+                Some(path) => std::fs::read_to_string(path).map_err(in_file(path))?,
                 None => HAPTIC_DBC.to_owned(),
             };
-            formats::dbc::channels(&frames, &dbc).map_err(named)?
+            formats::dbc::channels(&frames, &dbc).map_err(&named)?
         }
     };
     if let Some(rate_hz) = arguments.rate {
         recording = Recording {
-            groups: vec![recording.resampled(rate_hz).map_err(named)?],
+            groups: vec![recording.resampled(rate_hz).map_err(&named)?],
         };
     }
     let table = recording.table();
@@ -124,17 +119,15 @@ fn listed(recording: &Recording) -> Table {
 }
 
 fn time_column(text: &str) -> Result<TimeColumn, BadInput> {
+    let column = |name: &str, scale| TimeColumn {
+        name: name.trim().into(),
+        scale,
+    };
     let Some((name, scale)) = text.rsplit_once('*') else {
-        return Ok(TimeColumn {
-            name: text.trim().into(),
-            scale: None,
-        });
+        return Ok(column(text, None));
     };
     match scale.trim().parse::<f64>() {
-        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok(TimeColumn {
-            name: name.trim().into(),
-            scale: Some(scale),
-        }),
+        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok(column(name, Some(scale))),
         _ => Err(format!("--time {text}: the scale {scale:?} is no number above 0").into()),
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use haptic_batch::course::survey;
 use haptic_batch::files::open_course;
-use haptic_report::document::write_file;
+use haptic_report::document::write_bytes;
 use haptic_report::studies::course::{report, write_samples};
 
 use super::results::ResultArguments;
@@ -39,10 +39,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         write_samples(&survey, place)?;
     }
     if let Some(path) = &arguments.save {
-        let text = course.to_opendrive();
-        write_file(path, |file| file.write_all(text.as_bytes()))?;
+        write_bytes(path, course.to_opendrive())?;
         eprintln!("Saved: {}", path.display());
     }
-    let report = report(&survey, &course);
-    output.show(&report, &report.stamp(&survey), true)
+    output.show(&report(&survey, &course), &survey, true)
 }

@@ -66,8 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let output = arguments.results.begin("design")?;
     let answer = progress::over(drives(&question), "drives", |done| design(&question, done))?;
-    let report = report(&answer);
     let best = answer.best.map(|best| &answer.designs[best]);
     let holds = best.is_some_and(|best| best.left_by_itself == 0);
-    output.show(&report, &report.stamp(&answer), holds)
+    output.show(&report(&answer), &answer, holds)
 }

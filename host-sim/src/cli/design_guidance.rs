@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_batch::design_guidance::{DesignGuidance, Evaluated};
-use haptic_report::document::{Provenance, write_file};
+use haptic_report::document::{Provenance, write_bytes};
 use haptic_report::studies::design_guidance::{parameters, report};
 use serde_json::json;
 
@@ -12,7 +12,7 @@ use super::checkpoint::Checkpoint;
 use super::output;
 use super::progress::Threads;
 use super::results::ResultArguments;
-use super::{BadInput, Outcome, progress};
+use super::{BadInput, Outcome, in_file, progress};
 
 const OUT: &str = "Directory: every set that was driven, report, results and chosen.toml, which `run` and `ecu parameters` take. A search that was interrupted goes on where it was";
 /// The sets that were driven, a line each.
@@ -41,8 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let chosen = design.row(arguments.choose)?;
     let out = arguments.results.directory();
     output::check(out, "design-guidance", &[SETS])?;
-    let fail = |e: std::io::Error| BadInput(format!("{}: {e}", out.display()));
-    std::fs::create_dir_all(out).map_err(fail)?;
+    std::fs::create_dir_all(out).map_err(in_file(out))?;
     let heading = json!({
         "study": "design-guidance",
         "design": format!("{:016x}", design.identity()),
@@ -62,9 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     })??;
     bar.finish_and_clear();
     if let Some(place) = output.place() {
-        let text = parameters(&results, chosen);
-        write_file(&place.join("chosen.toml"), |file| file.write_all(text.as_bytes()))?;
+        write_bytes(&place.join("chosen.toml"), parameters(&results, chosen))?;
     }
-    let report = report(&results, chosen);
-    output.show(&report, &report.stamp(&results), true)
+    output.show(&report(&results, chosen), &results, true)
 }

@@ -51,6 +51,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let found = progress::over(drives, "drives", |done| {
         compare_drivers(logs, &options, arguments.pieces, done)
     });
-    let report = report(&found);
-    output.show(&report, &report.stamp(&found), true)
+    output.show(&report(&found), &found, true)
 }

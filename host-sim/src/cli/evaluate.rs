@@ -74,7 +74,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(place) = output.place() {
         write_series(&evaluation, arguments.series.into(), place)?;
     }
-    let report = report(&evaluation);
     let results = &evaluation.results;
-    output.show(&report, &report.stamp(results), results.all_claims_hold())
+    output.show(&report(&evaluation), results, results.all_claims_hold())
 }

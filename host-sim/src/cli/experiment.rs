@@ -28,6 +28,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(place) = output.place().filter(|_| arguments.logs) {
         write_logs(&result, &place.join("logs"))?;
     }
-    let report = report(&result);
-    output.show(&report, &report.stamp(&result), true)
+    output.show(&report(&result), &result, true)
 }

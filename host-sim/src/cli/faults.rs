@@ -3,13 +3,14 @@
 use clap::Args;
 use haptic_campaign::campaign;
 use haptic_campaign::drivers::Drivers;
-use haptic_campaign::table::{self as rows, FaultCase, Place};
+use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, document, target};
 use haptic_core::controller::params::LAWS;
-use haptic_report::document::write_file;
+use haptic_report::document::write_bytes;
 use haptic_report::studies::faults::{report, report_of_run};
 use haptic_sim::worlds::WORLDS;
 
+use super::availability::chosen;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, print, progress};
 
@@ -54,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         print(&document::table_of_faults())?;
         return Ok(Outcome::Good);
     }
-    let chosen = choose(&arguments.rows, arguments.target)?;
+    let rows = choose(&arguments.rows, arguments.target)?;
     let seeds = match arguments.seed {
         Some(seed) => seed..seed + 1,
         None => arguments.first_seed..arguments.first_seed + arguments.seeds,
@@ -62,16 +63,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("faults")?.named("faults.json");
     let world = match &arguments.world {
         None => World::new(),
-        Some(name) => match WORLDS.iter().find(|kind| kind.name == name) {
-            Some(kind) => World::of_kind(kind),
-            None => {
-                let known: Vec<&str> = WORLDS.iter().map(|kind| kind.name).collect();
-                return Err(BadInput(format!(
-                    "--world: there is no {name}; there are {}",
-                    known.join(", ")
-                )));
-            }
-        },
+        Some(name) => {
+            let names = std::slice::from_ref(name);
+            World::of_kind(chosen("--world", names, &WORLDS, |kind| kind.name)?[0])
+        }
     };
     let asked = |drivers: &Drivers| arguments.drivers.as_deref() == Some(drivers.name());
     let world = match Drivers::ALL.into_iter().find(asked) {
@@ -80,26 +75,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let law = LAWS.iter().position(|law| *law == arguments.law);
     let world = world.guided_by(law.unwrap_or_default());
-    let runs = chosen.len() as u64 * (seeds.end - seeds.start);
+    let runs = rows.len() as u64 * (seeds.end - seeds.start);
     let campaign = progress::over(runs, "runs", |done| {
         if arguments.target {
-            return target::run(&world, &chosen, seeds, done);
+            return target::run(&world, &rows, seeds, done);
         }
-        Ok(campaign::run(&world, &chosen, seeds, done))
+        Ok(campaign::run(&world, &rows, seeds, done))
     })?;
     let told = arguments.seed.into_iter().flat_map(|seed| {
         let world = &world;
-        chosen
-            .iter()
+        rows.iter()
             .map(move |row| report_of_run(row, world.run(row, seed)))
     });
-    let report = report(&campaign, told.collect());
     if let Some(place) = output.place() {
-        let faults = document::table_of_faults();
-        write_file(&place.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
+        write_bytes(&place.join("faults.md"), document::table_of_faults())?;
     }
     let holds = campaign.failures().next().is_none() && campaign.too_often().next().is_none();
-    output.show(&report, &report.stamp(&campaign), holds)
+    output.show(&report(&campaign, told.collect()), &campaign, holds)
 }
 
 fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, BadInput> {
@@ -109,21 +101,18 @@ fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, Ba
         Place::Target => false,
     };
     if names.is_empty() {
-        return Ok(rows::rows().filter(runs).collect());
+        return Ok(table::rows().filter(runs).collect());
     }
-    names
-        .iter()
-        .map(|name| match rows::rows().find(|row| row.name == name) {
-            None => Err(BadInput(format!(
-                "--rows: there is no fault {name}; --list shows them all"
-            ))),
-            Some(row) if row.place == Place::Target => Err(BadInput(format!(
-                "--rows: {name} breaks the image and not the controller: cargo test -p haptic-guidance resets::"
-            ))),
-            Some(row) if !runs(&row) => Err(BadInput(format!(
-                "--rows: {name} is not among those that run with --target"
-            ))),
+    let found = |name: &String| {
+        let refused = |why: &str| Err(BadInput(format!("--rows: {why}")));
+        match table::rows().find(|row| row.name == name) {
+            None => refused(&format!("there is no fault {name}; --list shows them all")),
+            Some(row) if row.place == Place::Target => refused(&format!(
+                "{name} breaks the image and not the controller: cargo test -p haptic-guidance resets::"
+            )),
+            Some(row) if !runs(&row) => refused(&format!("{name} is not among those that run with --target")),
             Some(row) => Ok(row),
-        })
-        .collect()
+        }
+    };
+    names.iter().map(found).collect()
 }

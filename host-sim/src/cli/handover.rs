@@ -16,7 +16,6 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("handover")?;
     let results = progress::over(ROWS as u64, "rows", |done| study(done))?;
-    let report = report(&results);
     let holds = !results.rows.iter().any(HandoverRow::is_broken);
-    output.show(&report, &report.stamp(&results), holds)
+    output.show(&report(&results), &results, holds)
 }

@@ -103,24 +103,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         let mut logs = vec![log];
         for path in &arguments.also {
-            logs.push(
-                arguments
-                    .recording
-                    .open_other(path, arguments.manual, &options.stretches)?
-                    .0,
-            );
+            let other = arguments
+                .recording
+                .open_other(path, arguments.manual, &options.stretches)?;
+            logs.push(other.0);
         }
-        identify_several(
-            &format!("{name} and {} more", arguments.also.len()),
-            &logs,
-            &options,
-        )?
+        let name = format!("{name} and {} more", arguments.also.len());
+        identify_several(&name, &logs, &options)?
     };
     let notes = &mut drive.results.identification.notes;
     notes.splice(0..0, converted);
     if let Some(course) = course {
         drive.drive_again(course, arguments.speed, &options)?;
     }
-    let report = report(&drive);
-    output.show(&report, &report.stamp(&drive.results), true)
+    output.show(&report(&drive), &drive.results, true)
 }

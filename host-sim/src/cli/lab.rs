@@ -38,12 +38,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         "windows" => ("cmd", &["/C", "start", ""]),
         _ => ("xdg-open", &[]),
     };
-    let status = Command::new(opener)
+    match Command::new(opener)
         .args(first)
         .arg(&page)
         .stdout(Stdio::null())
-        .status();
-    match status {
+        .status()
+    {
         Ok(status) if status.success() => Ok(Outcome::Good),
         Ok(_) | Err(_) => Err(format!("{opener} did not open it: open the file in a browser").into()),
     }

@@ -40,6 +40,7 @@ mod validate;
 
 use std::ffi::OsString;
 use std::fmt::Display;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -213,6 +214,11 @@ fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
 }
 
 /// What a reader of the results has to know, on stderr: stdout is the results' own.
+/// What to say of a file.
+fn in_file<E: Display>(path: &Path) -> impl Fn(E) -> BadInput {
+    move |error| BadInput(format!("{}: {error}", path.display()))
+}
+
 fn print_notes(notes: &[String]) {
     for note in notes {
         eprintln!("note: {note}");

@@ -77,15 +77,12 @@ pub(super) fn explain(error: &clap::Error, arguments: &[OsString]) -> Option<Str
     let Some(ContextValue::String(name)) = error.get(kind) else {
         return None;
     };
-    let words: Vec<String> = arguments
-        .iter()
-        .skip(1)
-        .map(|word| word.to_string_lossy().into_owned())
-        .collect();
+    let words = arguments.iter().skip(1);
+    let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
     let first = words.first()?;
-    let renamed = RENAMED
-        .iter()
-        .find(|(command, old, _)| name == old && (command.is_empty() || first == command));
+    let is_it =
+        |(command, old, _): &&(&str, &str, &str)| name == old && (command.is_empty() || first == command);
+    let renamed = RENAMED.iter().find(is_it);
     if let Some((_, old, new)) = renamed {
         return Some(format!("`{old}` is `{new}`"));
     }

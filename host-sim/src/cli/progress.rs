@@ -31,8 +31,12 @@ pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sy
 
 /// A bar of `length` steps.
 pub(super) fn bar(length: u64, unit: &str) -> ProgressBar {
-    let template = format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{elapsed}}");
+    styled(length, &format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{elapsed}}"))
+}
+
+/// A bar that looks as the template says.
+pub(super) fn styled(length: u64, template: &str) -> ProgressBar {
     // A template that does not parse would only cost the bar its looks.
-    let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length).with_style(style)
 }

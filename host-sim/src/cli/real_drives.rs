@@ -21,6 +21,5 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("real-drives")?;
     let found = real_drives(&arguments.directory)?;
-    let report = report(&found);
-    output.show(&report, &report.stamp(&found), true)
+    output.show(&report(&found), &found, true)
 }

@@ -53,16 +53,13 @@ impl RecordingArguments {
             .map
             .iter()
             .map(|map| map.parse())
-            .collect::<Result<Vec<Mapping>, _>>()
-            .map_err(|e| format!("--{e}"))?;
+            .collect::<Result<Vec<Mapping>, _>>();
+        let maps = maps.map_err(|e| format!("--{e}"))?;
         let layout = self.layout.as_deref().map(Layout::named).transpose()?;
+        let vehicle = self.vehicle.as_deref().map(load_scenario).transpose()?;
         let recording = Recording {
             dbc: self.dbc.as_deref(),
-            vehicle: self
-                .vehicle
-                .as_deref()
-                .map(|path| load_scenario(path).map(|scenario| single_track(&scenario)))
-                .transpose()?,
+            vehicle: vehicle.as_ref().map(single_track),
             manual,
             stretches,
         };

@@ -42,6 +42,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("reliance")?;
     let drives = plan.participants.len() as u64 * u64::from(plan.seeds);
     let results = progress::over(drives, "drives", |done| study(&plan, done))?;
-    let report = report(&results);
-    output.show(&report, &report.stamp(&results), true)
+    output.show(&report(&results), &results, true)
 }

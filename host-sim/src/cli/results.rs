@@ -84,8 +84,18 @@ impl Results<'_> {
         self.output.as_ref().map(Output::place)
     }
 
-    /// Writes and prints the results; the command has failed if a check did not hold.
+    /// Writes and prints the results with where they come from; the command has failed if a check did not hold.
     pub(super) fn show(
+        self,
+        report: &Report,
+        results: &impl Serialize,
+        holds: bool,
+    ) -> Result<Outcome, BadInput> {
+        self.show_bare(report, &report.stamp(results), holds)
+    }
+
+    /// The same of results that say by themselves where they come from.
+    pub(super) fn show_bare(
         self,
         report: &Report,
         results: &impl Serialize,

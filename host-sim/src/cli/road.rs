@@ -45,15 +45,12 @@ impl CourseArguments {
     pub(super) fn open(&self) -> Result<Option<Course>, InputError> {
         let choice = self.lane.choice();
         match &self.course {
-            Some(path) => {
-                let course = open(path, &choice)?;
-                Ok(Some(course))
-            }
+            Some(path) => open(path, &choice).map(Some),
             None if choice == LaneChoice::default() => Ok(None),
-            None => Err(InputError::new(
-                "--road, --lane and --turn",
-                "they need --course FILE.xodr",
-            )),
+            None => {
+                let options = "--road, --lane and --turn";
+                Err(InputError::new(options, "they need --course FILE.xodr"))
+            }
         }
     }
 }

@@ -42,6 +42,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(place) = output.place() {
         write_series(&single, arguments.series.into(), place)?;
     }
-    let report = report(&single);
-    output.show(&report, &report.stamp(&single.results), true)
+    output.show(&report(&single), &single.results, true)
 }

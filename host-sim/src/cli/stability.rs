@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use haptic_batch::files::load_scenario;
 use haptic_batch::stability::{PLACES, map, shares};
 use haptic_report::studies::stability::{Map, report};
 
@@ -24,10 +25,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let (name, base) = match &arguments.scenario {
         None => ("the paper's scenario".into(), Scenario::default()),
-        Some(path) => (
-            path.display().to_string(),
-            haptic_batch::files::load_scenario(path)?,
-        ),
+        Some(path) => (path.display().to_string(), load_scenario(path)?),
     };
     let output = arguments.results.begin("stability")?;
     let named = |e| InputError::new(&name, e);
@@ -35,7 +33,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         places: progress::over(PLACES as u64, "places", |done| map(&base, done)).map_err(named)?,
         shares: shares(&base).map_err(named)?,
     };
-    let report = report(&map);
     let holds = map.places.iter().all(|place| place.broken().next().is_none());
-    output.show(&report, &report.stamp(&map), holds)
+    output.show(&report(&map), &map, holds)
 }

@@ -72,6 +72,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         write_tables(&results, place)?;
     }
     eprintln!("Sessions: {}", out.join("sessions.csv").display());
-    let report = report(&results);
-    output.show(&report, &report.stamp(&results), true)
+    output.show(&report(&results), &results, true)
 }

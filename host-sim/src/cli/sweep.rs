@@ -1,19 +1,20 @@
 //! `host-sim sweep FILE.toml`.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use haptic_batch::VERSION;
 use haptic_batch::sweep::{Progress, Shard, Store, StoreError, Sweep, run_all};
-use haptic_report::document::{SeriesFormat, write_file, write_json};
+use haptic_report::document::{SeriesFormat, write_bytes, write_json};
 use haptic_report::studies::run as run_files;
 use haptic_report::studies::sweep as files;
 use haptic_report::studies::write;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use super::output::{self, Output};
-use super::progress::Threads;
+use super::progress::{Threads, styled};
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, print, width};
 
@@ -58,15 +59,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     output::check(out, "sweep", kept(out))?;
     let store = Store::open(&sweep, VERSION, out)?;
     output::keeps(out, "chunk")?;
-    let threads = arguments.threads.threads.map_or_else(
-        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        |threads| threads as usize,
-    );
+    let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let threads = arguments
+        .threads
+        .threads
+        .map_or_else(all, |threads| threads as usize);
     let bar = Bar::new();
     run_all(&store, &sweep, arguments.shard, threads, |progress| {
         bar.show(progress)
     })?;
-    bar.finish();
+    bar.bar.finish_and_clear();
     let summary = match store.finish() {
         Ok(summary) => summary,
         Err(error @ StoreError::Missing(..)) if arguments.shard != Shard::WHOLE => {
@@ -84,7 +86,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     eprintln!("Table: {}", out.join("drives.csv").display());
     let report = files::report(&sweep, &summary, &file);
-    output.named("summary.json").show(&report, &summary, true)
+    output.named("summary.json").show_bare(&report, &summary, true)
 }
 
 /// What a sweep keeps in its directory beside its report. Of a directory without a sweep nothing is its own.
@@ -114,12 +116,8 @@ fn replay(arguments: &Arguments, sweep: &Sweep, drive: u64) -> Result<Outcome, B
         write_drive(&scenario, directory)?;
     }
     let out = arguments.results.directory();
-    let stored = out.join("sweep.toml").exists();
-    let store = if stored {
-        Store::open(sweep, VERSION, out).ok()
-    } else {
-        None
-    };
+    let is_stored = out.join("sweep.toml").exists();
+    let store = is_stored.then(|| Store::open(sweep, VERSION, out).ok()).flatten();
     let Some(there) = store.and_then(|store| store.get_drive(drive)) else {
         eprintln!("There is no row to compare with in {}.", out.display());
         return Ok(Outcome::Good);
@@ -137,9 +135,7 @@ fn write_drive(scenario: &haptic_sim::Scenario, directory: &Path) -> Result<(), 
     let single = haptic_batch::run::run(scenario.clone(), false)?;
     let report = run_files::report(&single);
     output.finish(|place| {
-        write_file(&place.join("scenario.toml"), |f| {
-            f.write_all(scenario.to_toml().as_bytes())
-        })?;
+        write_bytes(&place.join("scenario.toml"), scenario.to_toml())?;
         run_files::write_series(&single, SeriesFormat::Csv, place)?;
         write_json(&place.join("results.json"), &report.stamp(&single.results))?;
         write(&report, place)
@@ -152,7 +148,7 @@ fn write_drive(scenario: &haptic_sim::Scenario, directory: &Path) -> Result<(), 
 struct Bar {
     bar: ProgressBar,
     since: Instant,
-    lines: std::sync::Mutex<Instant>,
+    lines: Mutex<Instant>,
 }
 
 /// Between two lines of a log.
@@ -160,13 +156,11 @@ const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
 impl Bar {
     fn new() -> Self {
-        let template = "{bar:40} {pos}/{len} drives, {msg}";
-        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let now = Instant::now();
         Self {
-            bar: ProgressBar::new(0).with_style(style),
+            bar: styled(0, "{bar:40} {pos}/{len} drives, {msg}"),
             since: now,
-            lines: std::sync::Mutex::new(now),
+            lines: Mutex::new(now),
         }
     }
 
@@ -185,17 +179,10 @@ impl Bar {
             self.bar.set_message(message);
             return;
         }
-        let mut last = self
-            .lines
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut last = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         if last.elapsed() >= BETWEEN_LINES || progress.done == progress.all {
             *last = Instant::now();
             eprintln!("{}/{} drives, {message}", progress.done, progress.all);
         }
-    }
-
-    fn finish(&self) {
-        self.bar.finish_and_clear();
     }
 }

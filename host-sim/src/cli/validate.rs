@@ -54,20 +54,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
     }
     let output = arguments.results.begin("validate")?;
-    let seeds = arguments
-        .coverage
-        .or(arguments.corruptions)
-        .or(arguments.methods)
-        .or(arguments.changes)
-        .or(arguments.recordings)
-        .unwrap_or(1);
-    let fits = if arguments.corruptions.is_some() {
-        ways
-    } else if arguments.recordings.is_some() {
-        CHANNELS.len() as u64
-    } else {
-        1
-    };
+    let questions = [
+        (arguments.coverage, 1),
+        (arguments.corruptions, ways),
+        (arguments.methods, 1),
+        (arguments.changes, 1),
+        (arguments.recordings, CHANNELS.len() as u64),
+    ];
+    let asked = questions
+        .into_iter()
+        .find_map(|(seeds, fits)| Some((seeds?, fits)));
+    let (seeds, fits) = asked.unwrap_or((1, 1));
     let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
     let result = progress::over(drives, "drives", |done| -> Result<_, StudyError> {
         Ok(if arguments.coverage.is_some() {
@@ -86,6 +83,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     for line in &broken {
         eprintln!("NOT KEPT: {line}");
     }
-    let report = result.report();
-    output.show(&report, &report.stamp(&result), broken.is_empty())
+    output.show(&result.report(), &result, broken.is_empty())
 }

@@ -32,7 +32,8 @@ use serde::Serialize;
 use crate::compare::{Chosen, Kinds, Mean};
 use crate::files::Source;
 use crate::study::interval_of_mean;
-use drive::{Job, Seen};
+use drive::Job;
+pub use drive::Seen;
 pub use linear::{Swing, of_series, steepest, swings};
 
 /// Small gain with a margin of two: the largest product of slopes that a law may have with a driver.

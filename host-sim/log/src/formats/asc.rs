@@ -19,28 +19,18 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, RecordingError> {
     let mut frames = Vec::new();
     for (line, content) in (1..).zip(text.lines()) {
         let words: Vec<&str> = content.split_whitespace().collect();
-        let lower = words
-            .iter()
-            .take(4)
-            .map(|word| word.to_lowercase())
-            .collect::<Vec<_>>();
-        if lower.first().is_some_and(|first| first == "base") {
-            base = if lower.get(1).is_some_and(|b| b == "dec") {
-                10
-            } else {
-                16
-            };
-            relative = lower.get(3).is_some_and(|t| t == "relative");
+        let is =
+            |place: usize, word: &str| words.get(place).is_some_and(|own| own.eq_ignore_ascii_case(word));
+        if is(0, "base") {
+            base = if is(1, "dec") { 10 } else { 16 };
+            relative = is(3, "relative");
             began = true;
             continue;
         }
-        began |= lower.first().is_some_and(|first| first == "date");
+        began |= is(0, "date");
         // Time, channel, identifier, direction, kind, length, data.
-        let Some(time_s) = words
-            .first()
-            .and_then(|word| word.parse::<f64>().ok())
-            .filter(|t| t.is_finite())
-        else {
+        let time_s = words.first().and_then(|word| word.parse::<f64>().ok());
+        let Some(time_s) = time_s.filter(|t| t.is_finite()) else {
             continue;
         };
         now_s = if relative { now_s + time_s } else { time_s };
@@ -56,18 +46,13 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, RecordingError> {
             None => (*id, false),
         };
         let id = u32::from_str_radix(id, base).map_err(|_| refuse("no identifier"))?;
-        let length = usize::from_str_radix(length, base)
-            .ok()
-            .filter(|n| *n <= 8)
-            .ok_or_else(|| refuse("no length"))?;
-        let data: Option<Vec<u8>> = data
-            .iter()
-            .take(length)
-            .map(|d| u8::from_str_radix(d, base).ok())
-            .collect();
-        let data = data
-            .filter(|data| data.len() == length)
-            .ok_or_else(|| refuse("not as many bytes as it says"))?;
+        let length = usize::from_str_radix(length, base).ok().filter(|n| *n <= 8);
+        let length = length.ok_or_else(|| refuse("no length"))?;
+        let bytes = data.iter().take(length).map(|d| u8::from_str_radix(d, base).ok());
+        let data = bytes
+            .collect::<Option<Vec<u8>>>()
+            .filter(|data| data.len() == length);
+        let data = data.ok_or_else(|| refuse("not as many bytes as it says"))?;
         frames.push(CandumpFrame {
             line,
             time_s: now_s,
@@ -90,13 +75,10 @@ pub(super) fn write(frames: &[CandumpFrame]) -> Vec<u8> {
     ];
     const DAYS: [&str; 7] = ["Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"];
     // Stamps of a run begin at zero and stay as they are.
-    let start_s = frames.first().map_or(0.0, |frame| {
-        if frame.time_s > 1e8 {
-            frame.time_s.floor()
-        } else {
-            0.0
-        }
-    });
+    let start_s = match frames.first() {
+        Some(frame) if frame.time_s > 1e8 => frame.time_s.floor(),
+        _ => 0.0,
+    };
     let [year, month, weekday, day, hour, minute, second, ms] = calendar::date((start_s * 1e3) as u64);
     let half = if hour < 12 { "am" } else { "pm" };
     let date = format!(

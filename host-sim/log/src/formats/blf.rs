@@ -24,9 +24,7 @@ const OBJECT_HEAD: u64 = 16;
 /// Another file, a damaged one.
 pub fn parse(file: &[u8]) -> Result<Vec<CandumpFrame>, RecordingError> {
     if !file.starts_with(SIGNATURE) {
-        return Err("this is no BLF file: it does not begin with LOGG"
-            .to_owned()
-            .into());
+        return Err("this is no BLF file: it does not begin with LOGG".into());
     }
     let bytes = Bytes(file);
     let mut start = [0; 8];
@@ -95,10 +93,9 @@ fn frames(stream: Bytes<'_>, start_ms: u64) -> Result<Vec<CandumpFrame>, Recordi
         if kind == CAN_MESSAGE || kind == CAN_MESSAGE_2 {
             let head_size = u64::from(stream.u16(at + 4)?);
             let ticks = stream.u64(at + 24)?;
-            let ns = if stream.u32(at + 16)? == 1 {
-                ticks.saturating_mul(10_000)
-            } else {
-                ticks
+            let ns = match stream.u32(at + 16)? {
+                1 => ticks.saturating_mul(10_000),
+                _ => ticks,
             };
             let body = at + head_size;
             let (flags, length) = (stream.u8(body + 2)?, stream.u8(body + 3)?.min(8));
@@ -156,11 +153,8 @@ pub(super) fn write(frames: &[CandumpFrame]) -> Vec<u8> {
         // Nanoseconds.
         inside.extend_from_slice(&2_u32.to_le_bytes());
         inside.extend_from_slice(&[0; 4]);
-        inside.extend_from_slice(
-            &ns(frame.time_s)
-                .saturating_sub(start_ms * 1_000_000)
-                .to_le_bytes(),
-        );
+        let since_ns = ns(frame.time_s).saturating_sub(start_ms * 1_000_000);
+        inside.extend_from_slice(&since_ns.to_le_bytes());
         inside.extend_from_slice(&1_u16.to_le_bytes());
         inside.push(0);
         inside.push(frame.data.len() as u8);
@@ -183,10 +177,7 @@ pub(super) fn write(frames: &[CandumpFrame]) -> Vec<u8> {
     file.extend_from_slice(&uncompressed.to_le_bytes());
     file.extend_from_slice(&(frames.len() as u32).to_le_bytes());
     file.extend_from_slice(&[0; 4]);
-    for part in calendar::date(start_ms)
-        .into_iter()
-        .chain(calendar::date(stop_ms))
-    {
+    for part in [start_ms, stop_ms].map(calendar::date).as_flattened() {
         file.extend_from_slice(&part.to_le_bytes());
     }
     file.resize(HEADING as usize, 0);

@@ -13,11 +13,7 @@ pub(super) fn date(ms: u64) -> Date {
     let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let from_march = (5 * of_year + 2) / 153;
     let day = of_year - (153 * from_march + 2) / 5 + 1;
-    let month = if from_march < 10 {
-        from_march + 3
-    } else {
-        from_march - 9
-    };
+    let month = (from_march + 2) % 12 + 1;
     let year = year_of_era + era * 400 + u64::from(month <= 2);
     let weekday = (days + 4) % 7;
     let parts = [
@@ -40,11 +36,7 @@ pub(super) fn ms(date: Date) -> Option<u64> {
     {
         return None;
     }
-    let (y, m) = if month <= 2 {
-        (year - 1, month + 9)
-    } else {
-        (year, month - 3)
-    };
+    let (y, m) = (year - u64::from(month <= 2), (month + 9) % 12);
     let days = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day - 1 - 719_468;
     Some(((days * 24 + hour) * 60 + minute) * 60_000 + second * 1000 + ms)
 }

@@ -2,13 +2,9 @@
 
 use std::collections::HashMap;
 
-use crate::recording::{Group, RecordingError, Series};
+use crate::recording::{Group, RecordingError, Series, refuse};
 use crate::table::{TableError, TableReader, TableWriter, number};
 use crate::units;
-
-fn refuse(e: impl std::fmt::Display) -> RecordingError {
-    RecordingError(e.to_string())
-}
 
 /// Columns of numbers; an empty field is NaN, `True` and `False` are 1 and 0. A column that holds no number at all is passed over, as text is.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Series>, RecordingError> {
@@ -78,12 +74,9 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     });
     let mut table =
         TableWriter::new(&mut out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)?;
-    let text = |value: f64| {
-        if value.is_nan() {
-            String::new()
-        } else {
-            format!("{value}")
-        }
+    let text = |value: f64| match value.is_nan() {
+        true => String::new(),
+        false => value.to_string(),
     };
     for (k, time_s) in group.time_s.iter().enumerate() {
         let values = group.channels.iter().map(|channel| channel.values[k]);

@@ -68,10 +68,8 @@ pub fn channels(frames: &[CandumpFrame], dbc: &str) -> Result<Recording, Recordi
         let Some(frames) = heard.get(&identifier(message.id)) else {
             continue;
         };
-        let channels = message
-            .signals
-            .iter()
-            .map(|signal| series(&dbc, message, signal, frames));
+        let signals = message.signals.iter();
+        let channels = signals.map(|signal| series(&dbc, message, signal, frames));
         groups.push(Group {
             name: message.name.clone(),
             time_s: frames.iter().map(|frame| frame.time_s).collect(),
@@ -91,18 +89,14 @@ fn series(
     signal: &Signal,
     frames: &[&CandumpFrame],
 ) -> Result<Series, RecordingError> {
-    let kind = dbc
-        .signal_extended_value_type_list
-        .iter()
-        .find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
+    let mut kinds = dbc.signal_extended_value_type_list.iter();
+    let kind = kinds.find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
     let float = kind.map(|entry| &entry.signal_extended_value_type);
-    let switch = message
-        .signals
-        .iter()
-        .find(|s| s.multiplexer_indicator == MultiplexIndicator::Multiplexor);
+    let mut signals = message.signals.iter();
+    let switch = signals.find(|s| s.multiplexer_indicator == MultiplexIndicator::Multiplexor);
     let wanted = match signal.multiplexer_indicator {
-        MultiplexIndicator::MultiplexedSignal(wanted) => Some(wanted),
-        MultiplexIndicator::MultiplexorAndMultiplexedSignal(wanted) => Some(wanted),
+        MultiplexIndicator::MultiplexedSignal(wanted)
+        | MultiplexIndicator::MultiplexorAndMultiplexedSignal(wanted) => Some(wanted),
         _ => None,
     };
     let value = |frame: &CandumpFrame| -> Result<f64, RecordingError> {
@@ -112,11 +106,8 @@ fn series(
             return Ok(f64::NAN);
         }
         let bits = raw(signal, &frame.data).ok_or_else(|| {
-            let (id, length) = (frame.id, frame.data.len());
-            let (line, name) = (frame.line, &signal.name);
-            RecordingError(format!(
-                "line {line}: frame {id:03X} has {length} bytes, too few for {name}"
-            ))
+            let (line, id, length, name) = (frame.line, frame.id, frame.data.len(), &signal.name);
+            format!("line {line}: frame {id:03X} has {length} bytes, too few for {name}")
         })?;
         let number = match float {
             Some(SignalExtendedValueType::IEEEfloat32Bit) => f64::from(f32::from_bits(bits as u32)),
@@ -126,13 +117,11 @@ fn series(
         };
         Ok(number * signal.factor + signal.offset)
     };
+    let values = frames.iter().map(|frame| value(frame));
     Ok(Series {
         name: signal.name.clone(),
         unit: signal.unit.clone(),
         source: message.transmitter.clone().unwrap_or_default(),
-        values: frames
-            .iter()
-            .map(|frame| value(frame))
-            .collect::<Result<_, _>>()?,
+        values: values.collect::<Result<_, _>>()?,
     })
 }

@@ -34,10 +34,9 @@ fn element(bytes: Bytes<'_>, at: u64) -> Result<(u32, Bytes<'_>, u64), Recording
         return Ok((tag & 0xFFFF, Bytes(bytes.slice(at + 4, size.min(4))?), at + 8));
     }
     let size = u64::from(bytes.u32(at + 4)?);
-    let padded = if tag == COMPRESSED {
-        size
-    } else {
-        size.next_multiple_of(8)
+    let padded = match tag {
+        COMPRESSED => size,
+        _ => size.next_multiple_of(8),
     };
     Ok((tag, Bytes(bytes.slice(at + 8, size)?), at + 8 + padded))
 }
@@ -45,11 +44,8 @@ fn element(bytes: Bytes<'_>, at: u64) -> Result<(u32, Bytes<'_>, u64), Recording
 /// Numbers of an element, by its type.
 fn numbers(kind: u32, b: Bytes<'_>) -> Vec<f64> {
     fn each<const N: usize>(b: Bytes<'_>, number: fn([u8; N]) -> f64) -> Vec<f64> {
-        b.0.as_chunks::<N>()
-            .0
-            .iter()
-            .map(|bytes| number(*bytes))
-            .collect()
+        let (numbers, _) = b.0.as_chunks::<N>();
+        numbers.iter().map(|bytes| number(*bytes)).collect()
     }
     match kind {
         1 => each::<1>(b, |x| f64::from(i8::from_le_bytes(x))),
@@ -70,12 +66,8 @@ fn numbers(kind: u32, b: Bytes<'_>) -> Vec<f64> {
 fn text(kind: u32, b: Bytes<'_>) -> String {
     let trimmed = |text: String| text.trim_end_matches(['\0', ' ']).to_owned();
     if [4, 17].contains(&kind) {
-        let units: Vec<u16> =
-            b.0.as_chunks::<2>()
-                .0
-                .iter()
-                .map(|x| u16::from_le_bytes(*x))
-                .collect();
+        let (units, _) = b.0.as_chunks::<2>();
+        let units: Vec<u16> = units.iter().map(|x| u16::from_le_bytes(*x)).collect();
         return trimmed(String::from_utf16_lossy(&units));
     }
     trimmed(String::from_utf8_lossy(b.0).into_owned())
@@ -134,17 +126,15 @@ fn matrix(b: Bytes<'_>, depth: u32) -> Result<(String, Value), RecordingError> {
 pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
     let b = Bytes(file);
     if file.starts_with(b"MATLAB 7.3") {
-        return Err("this is MATLAB 7.3 (HDF5): save it with -v7".to_owned().into());
+        return Err("this is MATLAB 7.3 (HDF5): save it with -v7".into());
     }
     match b.slice(124, 4) {
         Ok([0, 1, b'I', b'M']) => {}
         Ok([_, _, b'M', b'I']) => {
-            return Err("this MAT file is big-endian, which is not read".to_owned().into());
+            return Err("this MAT file is big-endian, which is not read".into());
         }
         _ => {
-            return Err("this is no MAT file of level 5: save it with -v6 or -v7"
-                .to_owned()
-                .into());
+            return Err("this is no MAT file of level 5: save it with -v6 or -v7".into());
         }
     }
     let (mut columns, mut units, mut sources) = (Vec::new(), Vec::new(), Vec::new());
@@ -254,11 +244,8 @@ fn valid(name: &str) -> Result<String, RecordingError> {
         valid.insert(0, 'c');
     }
     if valid.len() >= NAME {
-        return Err(format!(
-            "channel {name}: a name in a MAT file has at most {} characters",
-            NAME - 1
-        )
-        .into());
+        let most = NAME - 1;
+        return Err(format!("channel {name}: a name in a MAT file has at most {most} characters").into());
     }
     Ok(valid)
 }
@@ -268,11 +255,8 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     heading.resize(124, b' ');
     heading.extend_from_slice(&[0, 1, b'I', b'M']);
     let mut out = heading;
-    let names = group
-        .channels
-        .iter()
-        .map(|channel| valid(&channel.name))
-        .collect::<Result<Vec<_>, _>>()?;
+    let names = group.channels.iter().map(|channel| valid(&channel.name));
+    let names = names.collect::<Result<Vec<_>, _>>()?;
     let time = ("time_s", "s", "clock", &group.time_s);
     let own = names.iter().zip(&group.channels);
     let all: Vec<_> = std::iter::once(time)
@@ -301,13 +285,8 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
             put_matrix(&mut fields, CHAR, [rows, units.len() as i32], "", &[(4, &bytes)])?;
         }
         let length = (NAME as i32).to_le_bytes();
-        put_matrix(
-            &mut out,
-            STRUCT,
-            [1, 1],
-            what,
-            &[(5, &length), (1, &names), (MATRIX, &fields)],
-        )?;
+        let parts: [(u32, &[u8]); 3] = [(5, &length), (1, &names), (MATRIX, &fields)];
+        put_matrix(&mut out, STRUCT, [1, 1], what, &parts)?;
     }
     Ok(out)
 }

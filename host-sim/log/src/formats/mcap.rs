@@ -7,11 +7,7 @@ use mcap::records::MessageHeader;
 use mcap::write::Writer;
 use serde_json::{Map, Value, json};
 
-use crate::recording::{Recording, RecordingError, Series};
-
-fn refuse(e: impl std::fmt::Display) -> RecordingError {
-    RecordingError(e.to_string())
-}
+use crate::recording::{Recording, RecordingError, Series, refuse};
 
 pub(super) fn write(recording: &Recording) -> Result<Vec<u8>, RecordingError> {
     let mut writer = Writer::new(Cursor::new(Vec::new())).map_err(refuse)?;

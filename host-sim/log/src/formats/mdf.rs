@@ -28,11 +28,9 @@ impl<'a> Block<'a> {
         let (length, links) = (bytes.u64(at + 8)?, bytes.u64(at + 16)?);
         let end = at.checked_add(length).filter(|end| *end <= bytes.0.len() as u64);
         let fits = |end: &u64| links.checked_mul(8).is_some_and(|l| at + HEAD + l <= *end);
-        let end = end.filter(fits).ok_or_else(|| {
-            RecordingError(format!(
-                "byte {at}: a block of {length} bytes does not fit into the file"
-            ))
-        })?;
+        let end = end.filter(fits);
+        let end =
+            end.ok_or_else(|| format!("byte {at}: a block of {length} bytes does not fit into the file"))?;
         Ok(Self {
             bytes,
             at,
@@ -54,10 +52,9 @@ impl<'a> Block<'a> {
 
     /// Where a link leads; 0 is nowhere.
     fn link(&self, i: u64) -> u64 {
-        if i < self.links {
-            self.bytes.u64(self.at + HEAD + 8 * i).unwrap_or(0)
-        } else {
-            0
+        match i < self.links {
+            true => self.bytes.u64(self.at + HEAD + 8 * i).unwrap_or(0),
+            false => 0,
         }
     }
 
@@ -91,15 +88,13 @@ fn text(bytes: Bytes<'_>, at: u64) -> Result<String, RecordingError> {
         return Ok(String::new());
     }
     let block = Block::at(bytes, at)?;
-    let text = String::from_utf8_lossy(block.contents()?)
-        .trim_end_matches('\0')
-        .to_owned();
+    let text = String::from_utf8_lossy(block.contents()?);
+    let text = text.trim_end_matches('\0').to_owned();
     if block.kind() != b"##MD" {
         return Ok(text);
     }
-    let inside = text
-        .split_once("<TX")
-        .and_then(|(_, rest)| rest.split_once('>')?.1.split_once("</TX>"));
+    let inside = text.split_once("<TX");
+    let inside = inside.and_then(|(_, rest)| rest.split_once('>')?.1.split_once("</TX>"));
     Ok(inside.map_or(String::new(), |(inside, _)| inside.trim().to_owned()))
 }
 
@@ -281,10 +276,9 @@ fn place(block: &Block<'_>, data_bytes: u64) -> Result<Option<Place>, RecordingE
         kind,
         bit: 8 * u64::from(b.u32(data + 4)?) + u64::from(b.u8(data + 3)?),
         bits,
-        invalid_bit: if flags & 2 == 0 {
-            None
-        } else {
-            Some(8 * data_bytes + u64::from(b.u32(data + 16)?))
+        invalid_bit: match flags & 2 {
+            0 => None,
+            _ => Some(8 * data_bytes + u64::from(b.u32(data + 16)?)),
         },
         conversion,
     }))
@@ -295,11 +289,8 @@ impl Place {
         if self.is_virtual {
             return self.conversion.apply(row as f64);
         }
-        let invalid = |bit: u64| {
-            record
-                .get((bit / 8) as usize)
-                .is_none_or(|byte| byte >> (bit % 8) & 1 == 1)
-        };
+        let byte_of = |bit: u64| record.get((bit / 8) as usize);
+        let invalid = |bit: u64| byte_of(bit).is_none_or(|byte| byte >> (bit % 8) & 1 == 1);
         let from = (self.bit / 8) as usize;
         let size = (self.bit % 8 + u64::from(self.bits)).div_ceil(8) as usize;
         let Some(bytes) = record.get(from..from.saturating_add(size)) else {
@@ -336,19 +327,15 @@ struct Open {
 
 pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
     if !file.starts_with(b"MDF     ") {
-        let unfinished = file.starts_with(b"UnFinMF");
-        let what = if unfinished {
-            "an unfinished MDF file: finalise it first"
-        } else {
-            "no MDF file"
+        let what = match file.starts_with(b"UnFinMF") {
+            true => "an unfinished MDF file: finalise it first",
+            false => "no MDF file",
         };
         return Err(format!("this is {what}").into());
     }
     let bytes = Bytes(file);
     if bytes.u16(28)? < 400 {
-        return Err("this is MDF 3, which is not read: convert it to MDF 4"
-            .to_owned()
-            .into());
+        return Err("this is MDF 3, which is not read: convert it to MDF 4".into());
     }
     let header = Block::at(bytes, 64)?.expect("##HD")?;
     let mut groups = Vec::new();
@@ -367,19 +354,14 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
             for channel in chain(bytes, group.link(1), "##CN")? {
                 places.extend(place(&channel, data_bytes)?);
             }
-            let name = text(bytes, group.link(2))?;
-            let size = data_bytes + u64::from(bytes.u32(data + 28)?);
-            let varying = bytes.u16(data + 16)? & 1 == 1;
-            open.insert(
-                bytes.u64(data)?,
-                Open {
-                    name,
-                    size,
-                    varying,
-                    rows: 0,
-                    places,
-                },
-            );
+            let made = Open {
+                name: text(bytes, group.link(2))?,
+                size: data_bytes + u64::from(bytes.u32(data + 28)?),
+                varying: bytes.u16(data + 16)? & 1 == 1,
+                rows: 0,
+                places,
+            };
+            open.insert(bytes.u64(data)?, made);
         }
         let mut data = Vec::new();
         blocks.records(data_group.link(2), 0, &mut data)?;
@@ -389,7 +371,7 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
         groups.extend(made.into_iter().filter_map(|(_, open)| finished(open)));
     }
     if groups.is_empty() {
-        return Err("there is no group of channels with a time".to_owned().into());
+        return Err("there is no group of channels with a time".into());
     }
     Ok(Recording { groups })
 }

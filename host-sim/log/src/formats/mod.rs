@@ -74,11 +74,8 @@ impl Format {
     /// # Errors
     /// No extension that is known, with those that are.
     pub fn from_path(path: &Path) -> Result<Self, RecordingError> {
-        let extension = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .to_lowercase();
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let extension = extension.to_lowercase();
         let found = EXTENSIONS.iter().find(|(known, _)| *known == extension);
         found.map(|(_, format)| *format).ok_or_else(|| {
             let known: Vec<String> = EXTENSIONS.iter().map(|(known, _)| format!(".{known}")).collect();
@@ -156,9 +153,7 @@ fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result
         Format::Blf => return Ok(Contents::Frames(blf::parse(&bytes)?)),
         Format::Mdf4 => return Ok(Contents::Channels(mdf::read(&bytes)?.described())),
         Format::Mcap => {
-            return Err("MCAP is written, not read: convert from what it was made of"
-                .to_owned()
-                .into());
+            return Err("MCAP is written, not read: convert from what it was made of".into());
         }
         Format::Csv => csv::read(&bytes)?,
         Format::Mat => mat::read(&bytes)?,
@@ -209,12 +204,9 @@ fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Reco
         ("", None) => units::of_name(&time.name).unwrap_or("s"),
         (unit, _) => unit,
     };
-    let factor = scale.or_else(|| units::factor(unit, "s")).ok_or_else(|| {
-        RecordingError(format!(
-            "channel {}: its unit {unit:?} is no unit of time",
-            time.name
-        ))
-    })?;
+    let factor = scale.or_else(|| units::factor(unit, "s"));
+    let factor =
+        factor.ok_or_else(|| format!("channel {}: its unit {unit:?} is no unit of time", time.name))?;
     if let Some(other) = columns.iter().find(|c| c.values.len() != time.values.len()) {
         let (found, rows) = (other.values.len(), time.values.len());
         return Err(format!(
@@ -225,14 +217,7 @@ fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Reco
     }
     // 1.0 changes no bit.
     let time_s = time.values.iter().map(|t| t * factor).collect();
-    let recording = Recording {
-        groups: vec![Group {
-            name: String::new(),
-            time_s,
-            channels: columns,
-        }],
-    };
-    Ok(recording.described())
+    Ok(Recording::of(Group::new(time_s, columns)).described())
 }
 
 /// Writes channels into the file at `path`.
@@ -248,15 +233,13 @@ pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
         #[cfg(feature = "mcap")]
         Format::Mcap => mcap::write(&recording),
         #[cfg(not(feature = "mcap"))]
-        Format::Mcap => Err("this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap"
-            .to_owned()
-            .into()),
+        Format::Mcap => Err("this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap".into()),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::write(&recording.into_one_group().map_err(named)?),
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => Err(NO_PARQUET.to_owned().into()),
         Format::Candump | Format::Asc | Format::Blf => Err(
-            "a table of channels has no frames, and a bus log nothing else; `host-sim run --bus-log` records the bus".to_owned().into(),
+            "a table of channels has no frames, and a bus log nothing else; `host-sim run --bus-log` records the bus".into(),
         ),
     };
     std::fs::write(path, bytes.map_err(named)?).map_err(|e| named(e.to_string().into()))

@@ -17,14 +17,7 @@ impl Recording {
         if self.groups.len() <= 1 {
             return Ok(self.groups.into_iter().next().unwrap_or_default());
         }
-        let many = |name: &str| {
-            self.groups
-                .iter()
-                .flat_map(|g| &g.channels)
-                .filter(|c| c.name == name)
-                .count()
-                > 1
-        };
+        let many = |name: &str| self.channels().filter(|(_, c)| c.name == name).count() > 1;
         // Zero is added so that a negative zero, which some loggers write first, is the same instant as zero.
         let instants = |g: &Group| g.time_s.iter().map(|t| t + 0.0).collect::<Vec<f64>>();
         let mut time_s: Vec<f64> = self.groups.iter().flat_map(instants).collect();
@@ -42,10 +35,9 @@ impl Recording {
                 for (place, value) in places.iter().zip(&channel.values) {
                     values[*place] = *value;
                 }
-                let name = if many(&channel.name) {
-                    format!("{}.{}", group.name, channel.name)
-                } else {
-                    channel.name.clone()
+                let name = match many(&channel.name) {
+                    true => format!("{}.{}", group.name, channel.name),
+                    false => channel.name.clone(),
                 };
                 channels.push(Series {
                     name,
@@ -54,11 +46,7 @@ impl Recording {
                 });
             }
         }
-        Ok(Group {
-            name: String::new(),
-            time_s,
-            channels,
-        })
+        Ok(Group::new(time_s, channels))
     }
 
     /// Two channels of one group by one name could not be told apart in a file.
@@ -80,12 +68,8 @@ impl Recording {
     /// No time that all channels cover, instants that do not grow, a clock that was set, more than 30 million values.
     pub fn resampled(&self, rate_hz: f64) -> Result<Group, RecordingError> {
         let whole = |name: &str| {
-            let mut all = self
-                .groups
-                .iter()
-                .flat_map(|g| &g.channels)
-                .filter(|c| c.name == name);
-            all.all(|c| c.values.iter().all(|v| v.is_nan() || v.fract() == 0.0))
+            let mut all = self.channels().filter(|(_, c)| c.name == name);
+            all.all(|(_, c)| c.values.iter().all(|v| v.is_nan() || v.fract() == 0.0))
         };
         self.on_grid(rate_hz, whole)
     }
@@ -96,26 +80,13 @@ impl Recording {
     /// As there.
     fn on_grid(&self, rate_hz: f64, held: impl Fn(&str) -> bool) -> Result<Group, RecordingError> {
         self.check_names()?;
-        let channels: Vec<(&Group, &Series)> = self
-            .groups
-            .iter()
-            .flat_map(|g| g.channels.iter().map(move |c| (g, c)))
-            .collect();
-        let with_values = |g: &Group, c: &Series| -> (Vec<f64>, Vec<f64>) {
-            g.time_s
-                .iter()
-                .zip(&c.values)
-                .filter(|(_, v)| !v.is_nan())
-                .map(|(t, v)| (*t, *v))
-                .unzip()
-        };
         let mut courses = Vec::new();
-        for (group, channel) in channels {
+        for (group, channel) in self.channels() {
             if let Some(k) = group.step_back() {
                 let name = &channel.name;
                 return Err(format!("channel {name}: row {}: the time does not grow", k + 2).into());
             }
-            let (time_s, values) = with_values(group, channel);
+            let (time_s, values) = channel.there(group);
             let longest = (1..time_s.len()).max_by(|a, b| {
                 let gap = |k: usize| time_s[k] - time_s[k - 1];
                 gap(*a).total_cmp(&gap(*b))
@@ -132,17 +103,13 @@ impl Recording {
                 courses.push((channel, time_s, values));
             }
         }
-        let from = courses
-            .iter()
-            .map(|(_, t, _)| t[0])
-            .fold(f64::NEG_INFINITY, f64::max);
-        let to = courses
-            .iter()
-            .map(|(_, t, _)| t[t.len() - 1])
-            .fold(f64::INFINITY, f64::min);
+        let (starts, ends): (Vec<f64>, Vec<f64>) =
+            courses.iter().map(|(_, t, _)| (t[0], t[t.len() - 1])).unzip();
+        let from = starts.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let to = ends.into_iter().fold(f64::INFINITY, f64::min);
         let rows = ((to - from) * rate_hz + 1e-6).floor() + 1.0;
         if courses.is_empty() || rows < 1.0 {
-            return Err("the channels have no time in common".to_owned().into());
+            return Err("the channels have no time in common".into());
         }
         if rows * courses.len() as f64 > MOST_VALUES {
             let (span_s, count) = (to - from, courses.len());
@@ -161,11 +128,7 @@ impl Recording {
                 ..channel.clone()
             })
             .collect();
-        Ok(Group {
-            name: String::new(),
-            time_s,
-            channels,
-        })
+        Ok(Group::new(time_s, channels))
     }
 }
 

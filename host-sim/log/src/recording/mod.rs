@@ -55,10 +55,16 @@ impl RecordingError {
     }
 }
 
-impl From<String> for RecordingError {
-    fn from(sentence: String) -> Self {
-        Self(sentence)
+impl<T: Into<String>> From<T> for RecordingError {
+    fn from(sentence: T) -> Self {
+        Self(sentence.into())
     }
+}
+
+/// A refusal in the words of another error.
+#[cfg(feature = "formats")]
+pub(crate) fn refuse(e: impl std::fmt::Display) -> RecordingError {
+    RecordingError(e.to_string())
 }
 
 /// A line of the table of channels.
@@ -76,7 +82,25 @@ pub struct Line {
     pub samples: usize,
 }
 
+impl Series {
+    /// The instants at which it has a value, and these values.
+    fn there(&self, group: &Group) -> (Vec<f64>, Vec<f64>) {
+        let all = group.time_s.iter().copied().zip(self.values.iter().copied());
+        all.filter(|(_, value)| !value.is_nan()).unzip()
+    }
+}
+
 impl Group {
+    /// A group without a name.
+    #[must_use]
+    pub fn new(time_s: Vec<f64>, channels: Vec<Series>) -> Self {
+        Self {
+            time_s,
+            channels,
+            ..Self::default()
+        }
+    }
+
     /// Values a second, in the mean over the group's instants.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
@@ -86,10 +110,9 @@ impl Group {
     /// The first instant that is not after the one before it.
     #[must_use]
     pub fn step_back(&self) -> Option<usize> {
-        let steps = self.time_s.windows(2);
-        steps
-            .into_iter()
-            .position(|w| w[1].partial_cmp(&w[0]) != Some(std::cmp::Ordering::Greater))
+        self.time_s
+            .windows(2)
+            .position(|w| w[1].is_nan() || w[0].is_nan() || w[1] <= w[0])
     }
 }
 
@@ -101,28 +124,34 @@ fn rate_hz(time_s: &[f64]) -> f64 {
 }
 
 impl Recording {
+    /// A recording of one group.
+    #[must_use]
+    pub fn of(group: Group) -> Self {
+        let groups = vec![group];
+        Self { groups }
+    }
+
+    /// Every channel with its group.
+    fn channels(&self) -> impl Iterator<Item = (&Group, &Series)> {
+        self.groups
+            .iter()
+            .flat_map(|g| g.channels.iter().map(move |c| (g, c)))
+    }
+
     /// The table of channels.
     #[must_use]
     pub fn table(&self) -> Vec<Line> {
-        let lines = self.groups.iter().flat_map(|group| {
-            group.channels.iter().map(|channel| {
-                let there: Vec<f64> = group
-                    .time_s
-                    .iter()
-                    .zip(&channel.values)
-                    .filter(|(_, value)| !value.is_nan())
-                    .map(|(time_s, _)| *time_s)
-                    .collect();
-                Line {
-                    name: channel.name.clone(),
-                    unit: channel.unit.clone(),
-                    source: channel.source.clone(),
-                    sample_rate_hz: rate_hz(&there),
-                    samples: there.len(),
-                }
-            })
-        });
-        lines.collect()
+        let line = |(group, channel): (&Group, &Series)| {
+            let (there, _) = channel.there(group);
+            Line {
+                name: channel.name.clone(),
+                unit: channel.unit.clone(),
+                source: channel.source.clone(),
+                sample_rate_hz: rate_hz(&there),
+                samples: there.len(),
+            }
+        };
+        self.channels().map(line).collect()
     }
 
     /// The channel of a name, or of a group's name, a point and a name; with or without its unit in brackets behind it.
@@ -131,23 +160,19 @@ impl Recording {
     /// There is none, with the names that come near; there are several.
     pub fn find(&self, name: &str) -> Result<(&Group, &Series), RecordingError> {
         let named = |wanted: &str| -> Vec<(&Group, &Series)> {
-            let all = self
-                .groups
-                .iter()
-                .flat_map(|g| g.channels.iter().map(move |c| (g, c)));
-            all.filter(|(g, c)| c.name == wanted || format!("{}.{}", g.name, c.name) == wanted)
-                .collect()
+            let is_it =
+                |(g, c): &(&Group, &Series)| c.name == wanted || format!("{}.{}", g.name, c.name) == wanted;
+            self.channels().filter(is_it).collect()
         };
         let mut found = named(name);
         if found.is_empty() {
             found = named(units::bare(name));
         }
         if found.is_empty() {
-            let all = self
-                .groups
-                .iter()
-                .flat_map(|g| g.channels.iter().map(move |c| (g, c)));
-            found = all.filter(|(_, c)| units::bare(&c.name) == name).collect();
+            found = self
+                .channels()
+                .filter(|(_, c)| units::bare(&c.name) == name)
+                .collect();
         }
         match found[..] {
             [found] => Ok(found),
@@ -168,11 +193,7 @@ impl Recording {
     fn near(&self, name: &str) -> String {
         let lower = name.to_lowercase();
         let stem = lower.split(['_', '.', ' ']).next().unwrap_or(&lower);
-        let names = self
-            .groups
-            .iter()
-            .flat_map(|g| &g.channels)
-            .map(|c| c.name.as_str());
+        let names = self.channels().map(|(_, c)| c.name.as_str());
         let (near, all): (Vec<&str>, Vec<&str>) = names.partition(|n| n.to_lowercase().contains(stem));
         let (said, shown) = match (near.is_empty(), all.is_empty()) {
             (false, _) => ("near are", near),
@@ -195,13 +216,10 @@ impl Recording {
                     channel.source = own.source.to_string();
                 }
             } else if channel.unit.is_empty() {
-                let in_brackets = units::in_brackets(&channel.name)
-                    .map(|(_, unit)| unit)
-                    .filter(|unit| units::is_known(unit));
-                let unit = in_brackets
-                    .or_else(|| units::of_name(&channel.name))
-                    .unwrap_or_default();
-                channel.unit = unit.to_owned();
+                let in_brackets = units::in_brackets(&channel.name).map(|(_, unit)| unit);
+                let known = in_brackets.filter(|unit| units::is_known(unit));
+                let unit = known.or_else(|| units::of_name(&channel.name));
+                channel.unit = unit.unwrap_or_default().to_owned();
             }
         }
         self
@@ -216,12 +234,7 @@ impl From<&Trace> for Recording {
             source: channel.source.to_string(),
             values: trace.samples.iter().map(channel.value).collect(),
         });
-        Self {
-            groups: vec![Group {
-                name: String::new(),
-                time_s: trace.samples.iter().map(|sample| sample.time_s).collect(),
-                channels: channels.collect(),
-            }],
-        }
+        let time_s = trace.samples.iter().map(|sample| sample.time_s).collect();
+        Self::of(Group::new(time_s, channels.collect()))
     }
 }

@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::WriteError;
+use super::files::failed;
 
 /// Directory of a set under way, within the one asked for.
 const STAGING: &str = ".unfinished";
@@ -62,9 +63,10 @@ impl FileSet {
     /// The directory cannot be written, another program is writing a set there, or it holds what is not the owner's.
     pub fn begin(directory: &Path, owner: Owner<'_>) -> Result<Self, WriteError> {
         Self::check(directory, owner)?;
+        let is_new = |place: &&Path| !place.as_os_str().is_empty() && !place.exists();
         let made = directory
             .ancestors()
-            .take_while(|place| !place.as_os_str().is_empty() && !place.exists())
+            .take_while(is_new)
             .map(Path::to_path_buf)
             .collect();
         let staging = directory.join(STAGING);
@@ -161,15 +163,12 @@ fn refuse_what_is_foreign(directory: &Path, owner: Owner<'_>) -> io::Result<()> 
     match foreign.as_slice() {
         [] => Ok(()),
         [first, rest @ ..] => {
-            let more = if rest.is_empty() {
-                String::new()
-            } else {
-                format!(" and {} more files", rest.len())
+            let more = match rest.len() {
+                0 => String::new(),
+                count => format!(" and {count} more files"),
             };
-            refuse(format!(
-                "{first}{more}, which `host-sim {}` did not write",
-                owner.command
-            ))
+            let command = owner.command;
+            refuse(format!("{first}{more}, which `host-sim {command}` did not write"))
         }
     }
 }
@@ -198,13 +197,6 @@ impl Drop for FileSet {
             // A directory that holds something stays.
             let _ = fs::remove_dir(place);
         }
-    }
-}
-
-fn failed(path: &Path, cause: io::Error) -> WriteError {
-    WriteError {
-        path: path.to_path_buf(),
-        cause,
     }
 }
 

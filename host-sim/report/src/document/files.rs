@@ -19,6 +19,11 @@ pub struct WriteError {
     pub cause: io::Error,
 }
 
+pub(super) fn failed(path: &Path, cause: io::Error) -> WriteError {
+    let path = path.to_path_buf();
+    WriteError { path, cause }
+}
+
 /// Writes what `content` writes to `path`, and creates the directories above it.
 ///
 /// # Errors
@@ -27,15 +32,10 @@ pub fn write_file(
     path: &Path,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), WriteError> {
-    let failed = |cause| WriteError {
-        path: path.to_path_buf(),
-        cause,
-    };
+    let failed = |cause| failed(path, cause);
     let Some(name) = path.file_name() else {
-        return Err(failed(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "not the name of a file",
-        )));
+        let cause = io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file");
+        return Err(failed(cause));
     };
     if let Some(directory) = path.parent() {
         fs::create_dir_all(directory).map_err(failed)?;
@@ -55,6 +55,14 @@ fn write_to(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     let mut file = BufWriter::new(File::create(path)?);
     content(&mut file)?;
     file.flush()
+}
+
+/// Writes `path` with these bytes.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), WriteError> {
+    write_file(path, |file| file.write_all(bytes.as_ref()))
 }
 
 /// Writes `value` as indented JSON, ended by a newline. A float that is not finite becomes `null`.

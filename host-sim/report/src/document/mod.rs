@@ -17,7 +17,7 @@ mod text;
 mod trace_csv;
 
 pub use file_set::{FileSet, Owner};
-pub use files::{WriteError, write_file, write_json};
+pub use files::{WriteError, write_bytes, write_file, write_json};
 pub use metric_tables::{definitions_table, metrics_table};
 pub use provenance::{Provenance, Stamped};
 pub use trace_csv::{SeriesFormat, write_trace};
@@ -193,6 +193,17 @@ impl Cell {
             decimals,
         }
     }
+
+    /// How many of something there are.
+    pub fn count(things: impl TryInto<u64>) -> Self {
+        Self::number(things.try_into().ok().map(|things| things as f64), 0)
+    }
+
+    /// The ends of an interval, if there is one.
+    pub fn ends(interval: impl Into<Option<[f64; 2]>>, decimals: usize) -> [Self; 2] {
+        let ends = interval.into().map_or([None; 2], |ends| ends.map(Some));
+        ends.map(|end| Self::number(end, decimals))
+    }
 }
 
 /// A number with its sign, and with as many digits as tell it from zero: three behind the point at least.
@@ -206,6 +217,16 @@ pub fn signed(value: f64) -> String {
 }
 
 impl Report {
+    /// A report of these sections, without notes.
+    pub fn new(title: impl Into<String>, summary: impl Into<String>, sections: Vec<Section>) -> Self {
+        Self {
+            title: title.into(),
+            summary: summary.into(),
+            sections,
+            ..Self::default()
+        }
+    }
+
     /// The report as one HTML document.
     ///
     /// # Errors

@@ -7,9 +7,9 @@ use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, TextAnchor};
 
-use super::page::{LEFT, LETTER, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, TEXT_SIZE, names_room, text};
+use super::page::{LEFT, LETTER, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, TEXT_SIZE, fixed, names_room, text};
 use super::style::Style;
-use super::{Figure, Mark, Panel, Series, polyline, style};
+use super::{Figure, Mark, Marker, Panel, Series, polyline, style};
 
 /// Height of a row of names.
 const ROW_HEIGHT: f64 = 15.0;
@@ -105,14 +105,7 @@ impl<'a> Frame<'a> {
         } else {
             (self.x_limits, self.y_limits)
         };
-        let mut layout = Layout::new(across, up)
-            .with_clamp_axis()
-            .with_x_axis_min(across.0)
-            .with_x_axis_max(across.1)
-            .with_y_axis_min(up.0)
-            .with_y_axis_max(up.1)
-            .with_force_margins(self.left(), RIGHT)
-            .with_force_margins_y(self.above(), self.below())
+        let mut layout = fixed(across, up, [self.left(), self.above(), self.below()])
             .with_box_axes()
             .with_title_size(TEXT_SIZE)
             .with_label_size(TEXT_SIZE)
@@ -154,12 +147,8 @@ impl<'a> Frame<'a> {
             let zero = ReferenceLine::horizontal(0.0).with_color(style::MARKER);
             layout = layout.with_reference_line(zero.with_dasharray("").with_stroke_width(0.6));
         }
-        for marker in self
-            .figure
-            .markers
-            .iter()
-            .filter(|m| m.x >= across.0 && m.x <= across.1)
-        {
+        let is_within = |m: &&Marker| m.x >= across.0 && m.x <= across.1;
+        for marker in self.figure.markers.iter().filter(is_within) {
             let line = ReferenceLine::vertical(marker.x).with_color(style::MARKER);
             layout = layout.with_reference_line(line.with_dasharray(DOTTED).with_stroke_width(MARKER_WIDTH));
         }
@@ -173,10 +162,9 @@ impl<'a> Frame<'a> {
             .flat_map(|series| self.plots_of(series))
             .collect();
         // A panel without anything is not drawn at all; one with an empty line has its frame.
-        if plots.is_empty() {
-            vec![Plot::Line(LinePlot::new())]
-        } else {
-            plots
+        match plots.is_empty() {
+            true => vec![Plot::Line(LinePlot::new())],
+            false => plots,
         }
     }
 
@@ -196,11 +184,8 @@ impl<'a> Frame<'a> {
             Mark::Line => Vec::new(),
             Mark::Dots => vec![dots(style).with_data(places).into()],
             Mark::Whiskers(ends) => {
-                let whole = series
-                    .points
-                    .iter()
-                    .zip(ends)
-                    .filter(|(p, _)| p.0.is_finite() && p.1.is_finite());
+                let known = |(p, _): &(&(f64, f64), _)| p.0.is_finite() && p.1.is_finite();
+                let whole = series.points.iter().zip(ends).filter(known);
                 let arms = whole.map(|(p, [low, high])| (p.1 - low, high - p.1));
                 vec![whiskers(style, self.lies(), &places, arms)]
             }
@@ -221,10 +206,8 @@ impl<'a> Frame<'a> {
                 shown,
             } => {
                 let field = |((x, y), (strength, _)): (&(f64, f64), &(f64, String))| {
-                    let (x, y) = (
-                        [x - 0.5 * width, x + 0.5 * width],
-                        [y - 0.5 * height, y + 0.5 * height],
-                    );
+                    let x = [x - 0.5 * width, x + 0.5 * width];
+                    let y = [y - 0.5 * height, y + 0.5 * height];
                     let band = BandPlot::new(x, [y[0]; 2], [y[1]; 2]).with_color(style.colour);
                     Plot::Band(band.with_opacity(*strength))
                 };
@@ -251,24 +234,15 @@ impl<'a> Frame<'a> {
                     text(x, y, word, TICK_TEXT_SIZE, TextAnchor::Middle, "#000000")
                 }));
             }
-            let far = series
-                .points
-                .iter()
-                .filter(|p| self.lies() && p.1 > self.y_limits.1);
-            for (x, value) in far {
+            let far = |p: &&(f64, f64)| self.lies() && p.1 > self.y_limits.1;
+            for (x, value) in series.points.iter().filter(far) {
                 let Some(end) = beyond.get_mut((x.round() as usize).wrapping_sub(1)) else {
                     continue;
                 };
                 let word = format!("{value:.1} \u{2192}");
                 let y = top + share(*x, self.x_limits) * (bottom - top);
-                words.push(text(
-                    *end,
-                    y,
-                    &word,
-                    TICK_TEXT_SIZE,
-                    TextAnchor::End,
-                    style::by_index(series.style).colour,
-                ));
+                let colour = style::by_index(series.style).colour;
+                words.push(text(*end, y, &word, TICK_TEXT_SIZE, TextAnchor::End, colour));
                 *end -= LETTER * (word.chars().count() + 1) as f64;
             }
         }
@@ -278,25 +252,18 @@ impl<'a> Frame<'a> {
     /// Finite points, as they lie on the page.
     fn places(&self, series: &Series) -> Vec<(f64, f64)> {
         let last = self.figure.rows.len() as f64 + 1.0;
-        let finite = series
-            .points
-            .iter()
-            .copied()
-            .filter(|p| p.0.is_finite() && p.1.is_finite());
-        finite
-            .map(|(x, y)| if self.lies() { (y, last - x) } else { (x, y) })
-            .collect()
+        let points = series.points.iter().copied();
+        let finite = points.filter(|p| p.0.is_finite() && p.1.is_finite());
+        let placed = |(x, y)| if self.lies() { (y, last - x) } else { (x, y) };
+        finite.map(placed).collect()
     }
 
     /// Dash and width of a series' line.
     pub(super) fn line_style(&self, series: &Series) -> (&'static str, f64) {
         let style = style::by_index(series.style);
         // All pieces of a series look alike.
-        let length: f64 = self
-            .on_page(series)
-            .iter()
-            .map(|piece| polyline::length(piece))
-            .sum();
+        let pieces = self.on_page(series);
+        let length: f64 = pieces.iter().map(|piece| polyline::length(piece)).sum();
         if length > SCRIBBLE && !self.lies() {
             ("", SCRIBBLE_WIDTH)
         } else {

@@ -6,7 +6,7 @@ use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, TextAnchor};
 
 use super::frame::{Frame, INTERVAL_OPACITY, bounds, dots, ends, line, marker, stems, whiskers};
-use super::page::{LEFT, LETTER, PAGE_WIDTH, RIGHT, TEXT_SIZE, text};
+use super::page::{LEFT, LETTER, PAGE_WIDTH, RIGHT, TEXT_SIZE, fixed, text};
 use super::{Figure, Mark, Series, Shade, style};
 
 const LINE_HEIGHT: f64 = 22.0;
@@ -83,14 +83,7 @@ impl<'a> Legend<'a> {
     /// A panel whose units are points of the page, without axes.
     pub(super) fn layout(&self) -> Layout {
         let (x, y) = ((0.0, width()), (0.0, self.inner_height()));
-        let mut layout = Layout::new(x, y)
-            .with_clamp_axis()
-            .with_x_axis_min(x.0)
-            .with_x_axis_max(x.1)
-            .with_y_axis_min(y.0)
-            .with_y_axis_max(y.1)
-            .with_force_margins(LEFT, RIGHT)
-            .with_force_margins_y(ABOVE, BELOW)
+        let mut layout = fixed(x, y, [LEFT, ABOVE, BELOW])
             .with_show_grid(false)
             .with_axis_line_width(0.0)
             .with_tick_width(0.0);

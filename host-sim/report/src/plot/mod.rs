@@ -84,6 +84,26 @@ impl Axis {
             ..self
         }
     }
+
+    /// The same around these places, which are the middles of fields of a map.
+    pub fn around(self, places: &[f64]) -> Self {
+        let half = 0.5 * (places[1] - places[0]);
+        self.within(places[0] - half, places[places.len() - 1] + half)
+    }
+
+    /// A plot of these series over this axis of their values, without a title.
+    pub fn panel(self, series: impl IntoIterator<Item = Series>) -> Panel {
+        Panel::new("", self, series)
+    }
+
+    /// A figure of these panels, which share this axis.
+    pub fn figure(self, panels: impl IntoIterator<Item = Panel>) -> Figure {
+        Figure {
+            x: self,
+            panels: panels.into_iter().collect(),
+            ..Figure::default()
+        }
+    }
 }
 
 /// One plot of a figure.
@@ -99,13 +119,11 @@ pub struct Panel {
 
 impl Panel {
     /// A plot of these series.
-    pub fn new(title: impl Into<String>, y: Axis, series: Vec<Series>) -> Self {
-        let title = title.into();
+    pub fn new(title: impl Into<String>, y: Axis, series: impl IntoIterator<Item = Series>) -> Self {
+        let (title, series) = (title.into(), series.into_iter().collect());
         Self { title, y, series }
     }
-}
 
-impl Panel {
     /// Width and height of its fields, if it is a map.
     fn fields(&self) -> Option<[f64; 2]> {
         self.series.iter().find_map(|series| match series.mark {
@@ -159,6 +177,11 @@ pub struct Series {
 }
 
 impl Series {
+    /// A line through values at places.
+    pub fn through(label: &str, style: usize, x: &[f64], y: &[f64]) -> Self {
+        Self::line(label, style, x.iter().copied().zip(y.iter().copied()).collect())
+    }
+
     /// A line.
     pub fn line(label: &str, style: usize, points: Vec<(f64, f64)>) -> Self {
         Self::with_mark(label, style, Mark::Line, points)
@@ -204,16 +227,11 @@ impl Series {
                 (&[], &[])
             }
         };
-        let at = move |i: usize| inside(self.points.get(i).map_or(f64::NAN, |p| p.0));
-        let upper = uppers
-            .iter()
-            .enumerate()
-            .filter(move |(i, _)| at(*i))
-            .map(|(_, v)| *v);
-        let ends = whiskers
-            .iter()
-            .enumerate()
-            .filter(move |(i, _)| at(*i))
+        let inner = move |i: usize| self.points.get(i).is_some_and(|p| inside(p.0));
+        let upper = (0..).zip(uppers).filter(move |(i, _)| inner(*i)).map(|(_, v)| *v);
+        let ends = (0..)
+            .zip(whiskers)
+            .filter(move |(i, _)| inner(*i))
             .flat_map(|(_, v)| *v);
         let zero = matches!(self.mark, Mark::Stems | Mark::Bounds).then_some(0.0);
         own.chain(upper).chain(ends).chain(zero)
@@ -227,6 +245,14 @@ pub struct Marker {
     pub label: String,
     /// Where.
     pub x: f64,
+}
+
+impl Marker {
+    /// A line through all panels.
+    pub fn new(label: &str, x: f64) -> Self {
+        let label = label.into();
+        Self { label, x }
+    }
 }
 
 /// A stretch of the shared axis.
@@ -245,6 +271,18 @@ pub struct Band {
 }
 
 impl Band {
+    /// A band through all panels.
+    pub fn new(label: impl Into<String>, [from, to]: [f64; 2], shade: Shade) -> Self {
+        let (label, panel) = (label.into(), None);
+        Self {
+            label,
+            from,
+            to,
+            shade,
+            panel,
+        }
+    }
+
     /// Whether it is in a panel.
     pub(crate) fn is_in(&self, panel: usize) -> bool {
         self.panel.is_none_or(|own| own == panel)
@@ -275,6 +313,17 @@ const MARGIN: f64 = 0.05;
 const ROOM_BEHIND: f64 = 0.02;
 
 impl Figure {
+    /// A figure of rows with these names.
+    pub fn of_rows<N: Into<String>>(
+        names: impl IntoIterator<Item = N>,
+        panels: impl IntoIterator<Item = Panel>,
+    ) -> Self {
+        Self {
+            rows: names.into_iter().map(Into::into).collect(),
+            ..Axis::default().figure(panels)
+        }
+    }
+
     /// The figure as an SVG document.
     ///
     /// # Errors
@@ -301,14 +350,8 @@ impl Figure {
         let of_data = || match extent(points.filter(|p| p.1.is_finite()).map(|p| p.0)) {
             Some((low, high)) if low < high && self.has_lines() => {
                 // A line that ends before its time ends within the frame.
-                (
-                    low,
-                    high + if self.has_ends() {
-                        ROOM_BEHIND * (high - low)
-                    } else {
-                        0.0
-                    },
-                )
+                let behind = if self.has_ends() { ROOM_BEHIND } else { 0.0 };
+                (low, high + behind * (high - low))
             }
             // A dot or a stem stands free of the frame.
             Some((low, high)) if self.x.whole || low == high => (low - 0.5, high + 0.5),

@@ -1,9 +1,9 @@
 //! What a study of two adaptations shows: the maps of driver and law, their product, the closed loops over time.
 
+use super::with_interval;
 use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Band, Figure, Mark, Panel, Series};
-use haptic_batch::adaptation::{AdaptationResults, Pair, SMALL_GAIN, swings};
-use haptic_batch::compare::Mean;
+use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
+use haptic_batch::adaptation::{AdaptationResults, Pair, SMALL_GAIN, Seen, swings};
 
 /// How long trust's shares remember (`haptic_sim::drivers`), s.
 const MEMORY_S: f64 = 5.0;
@@ -23,36 +23,31 @@ pub fn report(results: &AdaptationResults) -> Report {
         "The product of slopes, negative, at which a linear loop begins to swing, and how long a swing lasts: the driver's memory of {MEMORY_S} s, \
          the lag of trust, the delay of the estimate, and a law without and with a lag. Below 1 no such loop swings."
     );
+    let small_gain = vec![
+        Block::figure("maps", maps_figure(results), maps),
+        Block::Table(products(results)),
+        Block::Text(judgement(results)),
+    ];
+    let k_hg = series_figure(results, k_hg_axis(), |seen| seen.k_hg);
+    let k_1 = series_figure(results, k_1_axis(), |seen| seen.k_1);
+    let closed_loop = vec![
+        Block::figure("k_hg", k_hg, over_time),
+        Block::figure("k_1", k_1, gains),
+        Block::Table(loops(results)),
+    ];
+    let swings = vec![
+        Block::figure("swings", swings_figure(), critical.clone()),
+        Block::Table(swings_table(critical)),
+    ];
+    let sections = vec![
+        Section::new("Small gain", small_gain),
+        Section::new("The closed loop", closed_loop),
+        Section::new("Where loops swing", swings),
+    ];
+    let title = format!("Two adaptations: {}", results.name);
     Report {
-        title: format!("Two adaptations: {}", results.name),
-        summary: summary(results),
         notes: notes(results),
-        sections: vec![
-            Section::new(
-                "Small gain",
-                vec![
-                    Block::figure("maps", maps_figure(results), maps),
-                    Block::Table(products(results)),
-                    Block::Text(judgement(results)),
-                ],
-            ),
-            Section::new(
-                "The closed loop",
-                vec![
-                    Block::figure("k_hg", series_figure(results, Quantity::KHg), over_time),
-                    Block::figure("k_1", series_figure(results, Quantity::K1), gains),
-                    Block::Table(loops(results)),
-                ],
-            ),
-            Section::new(
-                "Where loops swing",
-                vec![
-                    Block::figure("swings", swings_figure(), critical.clone()),
-                    Block::Table(swings_table(critical)),
-                ],
-            ),
-        ],
-        ..Report::default()
+        ..Report::new(title, summary(results), sections)
     }
 }
 
@@ -84,13 +79,6 @@ fn notes(results: &AdaptationResults) -> Vec<String> {
     vec![format!("{what}: {}", ended.join(", "))]
 }
 
-fn with_interval(value: Option<&Mean>) -> Cell {
-    Cell::Text(value.map_or("\u{2013}".into(), |value| match value.interval_95 {
-        Some([low, high]) => format!("{:.3} \u{b1} {:.3}", value.mean, 0.5 * (high - low)),
-        None => format!("{:.3}", value.mean),
-    }))
-}
-
 fn products(results: &AdaptationResults) -> Table {
     let row = |pair: &Pair| {
         let verdict = match pair.product {
@@ -117,13 +105,7 @@ fn products(results: &AdaptationResults) -> Table {
 
 /// The laws with which small gain holds for every driver.
 fn judgement(results: &AdaptationResults) -> String {
-    let all = |law: usize| {
-        results
-            .pairs
-            .iter()
-            .filter(|pair| pair.law == law)
-            .all(Pair::holds)
-    };
+    let all = |law: usize| results.pairs.iter().all(|pair| pair.law != law || pair.holds());
     let laws = results.laws.iter().enumerate();
     let held: Vec<&str> = laws
         .filter(|(law, _)| all(*law))
@@ -140,13 +122,14 @@ fn loops(results: &AdaptationResults) -> Table {
     let row = |pair: &Pair| {
         let [law, driver] = names(results, pair).map(Cell::text);
         let [before, behind] = &pair.k_hg;
+        let mean = |value| Cell::Text(with_interval(value));
         [
             ("Law", law),
             ("Driver", driver),
-            ("K_hg before the loss", with_interval(before.as_ref())),
-            ("Behind it", with_interval(behind.as_ref())),
-            (first.as_str(), with_interval(pair.against_first.as_ref())),
-            ("Deviation of K_1 (N.m)", with_interval(pair.swing_nm.as_ref())),
+            ("K_hg before the loss", mean(before.as_ref())),
+            ("Behind it", mean(behind.as_ref())),
+            (first.as_str(), mean(pair.against_first.as_ref())),
+            ("Deviation of K_1 (N.m)", mean(pair.swing_nm.as_ref())),
             ("Period (s)", Cell::number(pair.period_s, 0)),
         ]
     };
@@ -174,61 +157,37 @@ fn maps_figure(results: &AdaptationResults) -> Figure {
             Series::line(&results.laws[pair.law], pair.law, points.collect())
         };
         let both = [(0, "driver, from low K_hg"), (1, "driver, from high K_hg")];
-        Panel {
-            title: name.clone(),
-            y: Axis::new("K_hg", "-").within(0.0, 1.02),
-            series: pairs.map(of_law).chain(both.into_iter().map(of_driver)).collect(),
-        }
+        let series = pairs.map(of_law).chain(both.into_iter().map(of_driver));
+        Panel::new(name, k_hg_axis(), series)
     };
-    Figure {
-        x: Axis::new("K_1", "N.m"),
-        panels: results.drivers.iter().enumerate().map(panel).collect(),
-        ..Figure::default()
-    }
+    k_1_axis().figure(results.drivers.iter().enumerate().map(panel))
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Quantity {
-    KHg,
-    K1,
+fn k_hg_axis() -> Axis {
+    Axis::new("K_hg", "-").within(0.0, 1.02)
+}
+
+fn k_1_axis() -> Axis {
+    Axis::new("K_1", "N.m")
 }
 
 /// A panel for each driver, a line for each law.
-fn series_figure(results: &AdaptationResults, quantity: Quantity) -> Figure {
+fn series_figure(results: &AdaptationResults, axis: Axis, value: fn(&Seen) -> f64) -> Figure {
     let [lost_at_s, lost_for_s, ..] = results.times_s;
     let line = |pair: &Pair| {
-        let values = pair.series.iter().map(|seen| match quantity {
-            Quantity::KHg => seen.k_hg,
-            Quantity::K1 => seen.k_1,
-        });
-        let points = values
-            .enumerate()
-            .map(|(second, value)| (second as f64 + 1.0, value));
+        let points = (1..)
+            .zip(&pair.series)
+            .map(|(second, seen)| (f64::from(second), value(seen)));
         Series::line(&results.laws[pair.law], pair.law, points.collect())
     };
-    let panel = |(number, name): (usize, &String)| Panel {
-        title: name.clone(),
-        y: match quantity {
-            Quantity::KHg => Axis::new("K_hg", "-").within(0.0, 1.02),
-            Quantity::K1 => Axis::new("K_1", "N.m"),
-        },
-        series: results
-            .pairs
-            .iter()
-            .filter(|pair| pair.driver == number)
-            .map(line)
-            .collect(),
+    let panel = |(number, name): (usize, &String)| {
+        let pairs = results.pairs.iter().filter(|pair| pair.driver == number);
+        Panel::new(name, axis.clone(), pairs.map(line))
     };
+    let lost_s = [lost_at_s, lost_at_s + lost_for_s];
     Figure {
-        x: Axis::new("Time", "s"),
-        panels: results.drivers.iter().enumerate().map(panel).collect(),
-        bands: vec![Band {
-            label: "torque lost".into(),
-            from: lost_at_s,
-            to: lost_at_s + lost_for_s,
-            ..Band::default()
-        }],
-        ..Figure::default()
+        bands: vec![Band::new("torque lost", lost_s, Shade::Light)],
+        ..Axis::new("Time", "s").figure(results.drivers.iter().enumerate().map(panel))
     }
 }
 
@@ -242,13 +201,10 @@ fn critical(trust_s: f64, delay_s: f64, law_s: f64) -> String {
 /// A field for each time of trust and of the estimate.
 fn swings_figure() -> Figure {
     let size = [TRUST_S[1] - TRUST_S[0], DELAYS_S[1] - DELAYS_S[0]];
-    let around = |axis: Axis, all: [f64; 6], size: f64| axis.within(all[0] - 0.5 * size, all[5] + 0.5 * size);
+
     let panel = |law_s: f64| {
-        let fields = || {
-            DELAYS_S
-                .into_iter()
-                .flat_map(|delay_s| TRUST_S.map(|trust_s| (trust_s, delay_s)))
-        };
+        let of_delay = |delay_s| TRUST_S.map(|trust_s| (trust_s, delay_s));
+        let fields = || DELAYS_S.into_iter().flat_map(of_delay);
         // The nearer to 1 the product is, the stronger.
         let shown = fields().map(|(trust_s, delay_s)| {
             let found = swings(&[MEMORY_S, trust_s, law_s], delay_s);
@@ -259,20 +215,16 @@ fn swings_figure() -> Figure {
             size,
             shown: shown.collect(),
         };
-        Panel {
-            title: match law_s {
-                0.0 => "a law that follows at once".into(),
-                lag => format!("a law that follows with a lag of {lag} s"),
-            },
-            y: around(Axis::new("Delay", "s"), DELAYS_S, size[1]),
-            series: vec![Series::with_mark("", 1, mark, fields().collect())],
-        }
+        let title = match law_s {
+            0.0 => "a law that follows at once".into(),
+            lag => format!("a law that follows with a lag of {lag} s"),
+        };
+        let y = Axis::new("Delay", "s").around(&DELAYS_S);
+        Panel::new(title, y, [Series::with_mark("", 1, mark, fields().collect())])
     };
-    Figure {
-        x: around(Axis::new("Lag of trust", "s"), TRUST_S, size[0]),
-        panels: LAW_LAGS_S.map(panel).to_vec(),
-        ..Figure::default()
-    }
+    Axis::new("Lag of trust", "s")
+        .around(&TRUST_S)
+        .figure(LAW_LAGS_S.map(panel))
 }
 
 fn swings_table(caption: String) -> Table {

@@ -1,5 +1,6 @@
 //! What is shown of how often guidance leaves for nothing: tables and figures.
 
+use super::place;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
@@ -39,63 +40,52 @@ impl Detection {
     }
 }
 
+fn left_percent(row: &CaseResult) -> f64 {
+    100.0 * row.left as f64 / row.runs as f64
+}
+
 /// How often and how soon the ECU leaves when something is wrong.
 fn detection_table(faults: &Detection) -> Table {
     let row = |row: &CaseResult| {
         let time = |n: usize| Cell::number(row.left_after_ms.map(|times| f64::from(times[n])), 0);
-        let metres = |value: Option<f64>| Cell::number(value, 2);
+        let should = if row.asks_to_leave { "leave" } else { "may go on" };
         [
             ("Fault", Cell::text(row.name)),
             ("Class", Cell::Text(row.class.to_string())),
-            (
-                "ECU should",
-                Cell::Text(if row.asks_to_leave { "leave" } else { "may go on" }.into()),
-            ),
-            ("Runs", Cell::number(row.runs as f64, 0)),
-            (
-                "Left (%)",
-                Cell::number(100.0 * row.left as f64 / row.runs as f64, 0),
-            ),
+            ("ECU should", Cell::text(should)),
+            ("Runs", Cell::count(row.runs)),
+            ("Left (%)", Cell::number(left_percent(row), 0)),
             ("Median (ms)", time(0)),
             ("Longest (ms)", time(1)),
-            ("Deviation (m)", metres(Some(row.deviation_m))),
-            ("Beyond dropping (m)", metres(row.excess_m)),
+            ("Deviation (m)", Cell::number(row.deviation_m, 2)),
+            ("Beyond dropping (m)", Cell::number(row.excess_m, 2)),
         ]
     };
-    Table::of_rows(
-        format!("Faults noticed in the world '{}'", faults.world),
-        faults.shown().map(row),
-    )
+    let caption = format!("Faults noticed in the world '{}'", faults.world);
+    Table::of_rows(caption, faults.shown().map(row))
 }
 
 fn detection_figure(faults: &Detection) -> Figure {
-    let places = || faults.shown().enumerate().map(|(i, row)| (i as f64 + 1.0, row));
-    let left = places()
-        .map(|(x, row)| (x, 100.0 * row.left as f64 / row.runs as f64))
-        .collect();
+    let places = || faults.shown().enumerate().map(|(i, row)| (place(i), row));
+    let left = places().map(|(x, row)| (x, left_percent(row))).collect();
     let after = |n: usize| {
         let times = places().filter_map(|(x, row)| Some((x, 1e-3 * f64::from(row.left_after_ms?[n]))));
         times.collect::<Vec<_>>()
     };
-    Figure {
-        rows: faults.shown().map(|row| row.name.into()).collect(),
-        panels: vec![
-            Panel::new(
-                "The ECU left",
-                Axis::new("Share of the runs", "%").within(0.0, 105.0),
-                vec![Series::with_mark("", 2, Mark::Stems, left)],
-            ),
-            Panel::new(
-                "How soon",
-                Axis::new("Time from the onset", "s"),
-                vec![
-                    Series::with_mark("longest", 3, Mark::Stems, after(1)),
-                    Series::dots("median", 1, after(0)),
-                ],
-            ),
-        ],
-        ..Figure::default()
-    }
+    let share = Axis::new("Share of the runs", "%").within(0.0, 105.0);
+    let times = [
+        Series::with_mark("longest", 3, Mark::Stems, after(1)),
+        Series::dots("median", 1, after(0)),
+    ];
+    let panels = [
+        Panel::new(
+            "The ECU left",
+            share,
+            [Series::with_mark("", 2, Mark::Stems, left)],
+        ),
+        Panel::new("How soon", Axis::new("Time from the onset", "s"), times),
+    ];
+    Figure::of_rows(faults.shown().map(|row| row.name), panels)
 }
 
 /// The study's document.
@@ -124,12 +114,7 @@ pub fn report(results: &Balance) -> Report {
         ];
         sections.push(Section::new("Faults noticed in the same world", blocks));
     }
-    Report {
-        title: "Guidance that leaves for nothing".into(),
-        summary: SUMMARY.into(),
-        sections,
-        ..Report::default()
-    }
+    Report::new("Guidance that leaves for nothing", SUMMARY, sections)
 }
 
 /// What is known of a rate after so many hours.
@@ -153,34 +138,22 @@ fn finding(rate: &Rate, hours: f64) -> String {
 /// Every world on every road; the roads of a judged one together.
 fn table(results: &Availability) -> Table {
     let row = |row: &Row| {
+        let judged = if row.judged { "judged" } else { "beyond" };
+        let rate = finding(&row.declarations, row.hours);
+        let with_one = format!("{} of {}", row.cars_with, row.cars);
         [
             ("World", Cell::text(row.world)),
             ("Road", Cell::text(row.road)),
-            (
-                "Judged",
-                Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
-            ),
+            ("Judged", Cell::text(judged)),
             ("Hours", Cell::number(row.hours, 2)),
-            (
-                "False declarations",
-                Cell::number(row.declarations.count as f64, 0),
-            ),
-            (
-                "Rate, 95 % confidence",
-                Cell::Text(finding(&row.declarations, row.hours)),
-            ),
+            ("False declarations", Cell::count(row.declarations.count)),
+            ("Rate, 95 % confidence", Cell::Text(rate)),
             ("At most (1/h)", Cell::number(row.declarations.upper_95, 4)),
-            (
-                "Cars with one",
-                Cell::Text(format!("{} of {}", row.cars_with, row.cars)),
-            ),
-            (
-                "Time without guidance (%)",
-                Cell::number(100.0 * (1.0 - row.available), 2),
-            ),
-            ("Latched", Cell::number(row.latched as f64, 0)),
-            ("Off the road", Cell::number(row.diverged as f64, 0)),
-            ("Lost by hand", Cell::number(row.lost_by_hand.segments as f64, 0)),
+            ("Cars with one", Cell::Text(with_one)),
+            ("Time without guidance (%)", Cell::number(away_percent(row), 2)),
+            ("Latched", Cell::count(row.latched)),
+            ("Off the road", Cell::count(row.diverged)),
+            ("Lost by hand", Cell::count(row.lost_by_hand.segments)),
             ("SDLP (m)", Cell::number(row.sdlp_m, 2)),
         ]
     };
@@ -191,15 +164,13 @@ fn table(results: &Availability) -> Table {
 fn causes(results: &Availability) -> Table {
     let rows = results.cells.iter().flat_map(|row| {
         row.causes.iter().map(|cause| {
+            let rate = finding(&cause.rate, row.hours);
             [
                 ("World", Cell::text(row.world)),
                 ("Road", Cell::text(row.road)),
-                ("Faults", Cell::Text(cause.faults.clone())),
-                ("Declarations", Cell::number(cause.rate.count as f64, 0)),
-                (
-                    "Rate, 95 % confidence",
-                    Cell::Text(finding(&cause.rate, row.hours)),
-                ),
+                ("Faults", Cell::text(&cause.faults)),
+                ("Declarations", Cell::count(cause.rate.count)),
+                ("Rate, 95 % confidence", Cell::Text(rate)),
             ]
         })
     });
@@ -214,102 +185,86 @@ fn drives(results: &Availability) -> Table {
         Ended::Diverged => "off the road",
     };
     let row = |segment: &DriveSegment| {
-        let declared = segment.declarations.iter().map(|declaration| {
+        let declared = segment.declarations.iter().map(|d| {
             format!(
                 "{} at {:.1} s, {:.2} m/s2",
-                declaration.faults, declaration.time_s, declaration.lateral_m_per_s2
+                d.faults, d.time_s, d.lateral_m_per_s2
             )
         });
+        let declared = declared.collect::<Vec<_>>().join("; ");
+        let by_hand = &segment.by_hand;
         [
-            ("World", Cell::Text(segment.world.clone())),
-            ("Road", Cell::Text(segment.road.clone())),
-            ("Drive", Cell::number(f64::from(segment.number), 0)),
+            ("World", Cell::text(&segment.world)),
+            ("Road", Cell::text(&segment.road)),
+            ("Drive", Cell::count(segment.number)),
             ("Car", Cell::Text(segment.car.to_string())),
             ("Speed (km/h)", Cell::number(segment.speed_kmh, 1)),
             (
                 "Declared, at a lateral acceleration of the road",
-                Cell::Text(declared.collect::<Vec<_>>().join("; ")),
+                Cell::Text(declared),
             ),
-            ("Ended", Cell::Text(off(segment.ended).into())),
-            ("By hand", Cell::Text(off(segment.by_hand.ended).into())),
+            ("Ended", Cell::text(off(segment.ended))),
+            ("By hand", Cell::text(off(by_hand.ended))),
             (
                 "Largest error by hand (m)",
-                Cell::number(segment.by_hand.largest_error_m, 2),
+                Cell::number(by_hand.largest_error_m, 2),
             ),
         ]
     };
-    Table::of_rows(
-        "Drives in which something happened",
-        results.segments.iter().map(row),
-    )
+    let caption = "Drives in which something happened";
+    Table::of_rows(caption, results.segments.iter().map(row))
 }
 
 /// What each world has beyond the paper's.
 pub fn worlds() -> Table {
-    let row = |c: &WorldKind| vec![Cell::text(c.name), Cell::text(c.what)];
-    Table::new(
-        "What each world adds to the paper's",
-        ["World", "What it adds"],
-        WORLDS.iter().map(row),
-    )
+    let row = |c: &WorldKind| {
+        [
+            ("World", Cell::text(c.name)),
+            ("What it adds", Cell::text(c.what)),
+        ]
+    };
+    Table::of_rows("What each world adds to the paper's", WORLDS.iter().map(row))
+}
+
+fn away_percent(row: &Row) -> f64 {
+    100.0 * (1.0 - row.available)
 }
 
 fn figure(results: &Availability) -> Figure {
-    let places = || {
-        results
-            .cells
-            .iter()
-            .enumerate()
-            .map(|(i, row)| (i as f64 + 1.0, row))
-    };
+    let places = || results.cells.iter().enumerate().map(|(i, row)| (place(i), row));
     let seen = || places().filter(|(_, row)| row.declarations.count > 0);
     let rates = seen().map(|(x, row)| (x, row.declarations.per_hour)).collect();
     let intervals = seen().map(|(_, row)| row.declarations.interval).collect();
     let none = places().filter(|(_, row)| row.declarations.count == 0);
     let bounds: Vec<_> = none.map(|(x, row)| (x, row.declarations.upper_95)).collect();
-    let away = places()
-        .map(|(x, row)| (x, 100.0 * (1.0 - row.available)))
-        .collect();
+    let away = places().map(|(x, row)| (x, away_percent(row))).collect();
     // From zero; what was seen is not made small by how little the rest was driven.
     let most =
         |values: &mut dyn Iterator<Item = f64>| 1.05 * values.filter(|v| v.is_finite()).fold(0.1, f64::max);
     let most_seen = most(&mut seen().map(|(_, row)| row.declarations.interval[1]));
     let least_bound = bounds.iter().map(|bound| bound.1).fold(f64::INFINITY, f64::min);
     let most_rate = most(&mut [most_seen, 1.1 * least_bound].into_iter());
-    Figure {
-        rows: results
-            .cells
-            .iter()
-            .map(|row| {
-                let lost = if row.hours > 0.0 { "" } else { " (lost by hand)" };
-                format!("{}, {}{lost}", row.world, row.road)
-            })
-            .collect(),
-        panels: vec![
-            Panel::new(
-                "False declarations",
-                Axis::new("Rate", "1/h").within(0.0, most_rate),
-                vec![
-                    Series::with_mark(
-                        "seen, with the 95 % interval",
-                        1,
-                        Mark::Whiskers(intervals),
-                        rates,
-                    ),
-                    Series::with_mark("none seen: at most (95 %)", 0, Mark::Bounds, bounds),
-                ],
-            ),
-            Panel::new(
-                "Without guidance",
-                Axis::new("Share of the time", "%").within(
-                    0.0,
-                    most(&mut results.cells.iter().map(|row| 100.0 * (1.0 - row.available))),
-                ),
-                vec![Series::with_mark("", 2, Mark::Stems, away)],
-            ),
-        ],
-        ..Figure::default()
-    }
+    let name = |row: &Row| {
+        let lost = if row.hours > 0.0 { "" } else { " (lost by hand)" };
+        format!("{}, {}{lost}", row.world, row.road)
+    };
+    let seen = Mark::Whiskers(intervals);
+    let rates = [
+        Series::with_mark("seen, with the 95 % interval", 1, seen, rates),
+        Series::with_mark("none seen: at most (95 %)", 0, Mark::Bounds, bounds),
+    ];
+    let rate = Axis::new("Rate", "1/h").within(0.0, most_rate);
+    let most_away = most(&mut results.cells.iter().map(away_percent));
+    let share = Axis::new("Share of the time", "%").within(0.0, most_away);
+    let panels = [
+        Panel::new("False declarations", rate, rates),
+        Panel::new(
+            "Without guidance",
+            share,
+            [Series::with_mark("", 2, Mark::Stems, away)],
+        ),
+    ];
+    Figure::of_rows(results.cells.iter().map(name), panels)
 }
 
 #[cfg(test)]

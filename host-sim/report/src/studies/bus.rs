@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use super::place;
 use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Panel, Series};
+use crate::plot::{Axis, Figure, Mark, Series};
 use haptic_batch::bus_load::{BIT_RATE, MAX_LOAD, MessageLoad};
 
 /// The load of the bus, as JSON holds it.
@@ -42,46 +43,30 @@ impl Load {
     /// Message by message, and the sum.
     fn table(&self) -> Table {
         let share = |load: f64| Cell::number(100.0 * load, 2);
-        let rows = self.messages.iter().map(|row| {
+        let row = |row: &MessageLoad| {
             vec![
                 Cell::text(row.message),
                 Cell::Text(format!("{:#05x}", row.id)),
                 Cell::number(row.period_ms, 1),
-                Cell::number(f64::from(row.bits), 0),
+                Cell::count(row.bits),
                 share(row.load),
             ]
-        });
-        let nothing = || Cell::Text(String::new());
-        let sum = vec![
-            Cell::text("all"),
-            nothing(),
-            nothing(),
-            nothing(),
-            share(self.load),
-        ];
-        Table::new(
-            "",
-            ["Message", "Identifier", "Period (ms)", "Bits", "Load (%)"],
-            rows.chain([sum]),
-        )
+        };
+        let sum = ["all", "", "", ""]
+            .into_iter()
+            .map(Cell::text)
+            .chain([share(self.load)]);
+        let columns = ["Message", "Identifier", "Period (ms)", "Bits", "Load (%)"];
+        Table::new("", columns, self.messages.iter().map(row).chain([sum.collect()]))
     }
 
     fn figure(&self) -> Figure {
         let points = self.messages.iter().enumerate();
-        let points = points
-            .map(|(i, row)| (i as f64 + 1.0, 100.0 * row.load))
-            .collect();
+        let points = points.map(|(i, row)| (place(i), 100.0 * row.load)).collect();
         let most = self.messages.iter().map(|m| m.load).fold(0.0, f64::max);
         let y = Axis::new("Worst-case share of the bus", "%").within(0.0, 108.0 * most);
-        Figure {
-            rows: self.messages.iter().map(|row| row.message.into()).collect(),
-            panels: vec![Panel::new(
-                "",
-                y,
-                vec![Series::with_mark("", 1, crate::plot::Mark::Stems, points)],
-            )],
-            ..Figure::default()
-        }
+        let panel = y.panel([Series::with_mark("", 1, Mark::Stems, points)]);
+        Figure::of_rows(self.messages.iter().map(|row| row.message), [panel])
     }
 
     /// The document of the load.
@@ -91,15 +76,12 @@ impl Load {
             Block::figure("bus", self.figure(), caption),
             Block::Table(self.table()),
         ];
-        Report {
-            title: "How full the bus is at worst".into(),
-            summary: format!(
-                "All messages together: {:.2} %. {}",
-                100.0 * self.load,
-                self.judgement()
-            ),
-            sections: vec![Section::new("Message by message", blocks)],
-            ..Report::default()
-        }
+        let summary = format!(
+            "All messages together: {:.2} %. {}",
+            100.0 * self.load,
+            self.judgement()
+        );
+        let sections = vec![Section::new("Message by message", blocks)];
+        Report::new("How full the bus is at worst", summary, sections)
     }
 }

@@ -1,19 +1,17 @@
 //! What is shown of drivers who change while they drive.
 
-use haptic_batch::experiment::{Changes, ChangesLine};
+use haptic_batch::experiment::{Changes, ChangesLine, Held};
 
 use super::place;
 use crate::document::{Cell, Table};
-use crate::plot::{Axis, Figure, Panel, Series};
+use crate::plot::{Axis, Figure, Series};
 
 /// What came out, in a sentence or two.
 pub(super) fn summary(found: &Changes) -> String {
     let all = &found.all;
     let identified: usize = all.identified.iter().sum();
     let wrong: usize = all.false_identifications.iter().sum();
-    let share = |held: haptic_batch::experiment::Held| {
-        held.share().map_or("-".into(), |x| format!("{:.1} %", 100.0 * x))
-    };
+    let share = |held: Held| held.share().map_or("-".into(), |x| format!("{:.1} %", 100.0 * x));
     format!(
         "{wrong} of {identified} identified values are false. Instants of steps of K_hg: within 5 s in {} of {} seen. The 95 % intervals \
          of begin and end of a change hold the truth in {} of {}.",
@@ -26,21 +24,20 @@ pub(super) fn summary(found: &Changes) -> String {
 
 pub(super) fn table(found: &Changes) -> Table {
     let row = |l: &ChangesLine| {
-        let count = |n: usize| Cell::number(n as f64, 0);
-        let share = |held: haptic_batch::experiment::Held| Cell::number(held.share(), 3);
+        let share = |held: Held| Cell::number(held.share(), 3);
         [
             ("What changes", Cell::text(l.kind)),
-            ("Drives", count(l.drives)),
-            ("Seen", count(l.seen)),
-            ("Refuted otherwise", count(l.refuted_otherwise)),
-            ("Steps of K_hg seen", count(l.steps_seen)),
-            ("within 5 s", count(l.within_5_s)),
+            ("Drives", Cell::count(l.drives)),
+            ("Seen", Cell::count(l.seen)),
+            ("Refuted otherwise", Cell::count(l.refuted_otherwise)),
+            ("Steps of K_hg seen", Cell::count(l.steps_seen)),
+            ("within 5 s", Cell::count(l.within_5_s)),
             ("Instants held by 95 %", share(l.instants)),
-            ("Identified", count(l.identified[0])),
-            ("False", count(l.false_identifications[0])),
+            ("Identified", Cell::count(l.identified[0])),
+            ("False", Cell::count(l.false_identifications[0])),
             ("Held by 95 %", share(l.intervals[0])),
-            ("In pieces: identified", count(l.identified[1])),
-            ("False", count(l.false_identifications[1])),
+            ("In pieces: identified", Cell::count(l.identified[1])),
+            ("False", Cell::count(l.false_identifications[1])),
             ("Held by 95 %", share(l.intervals[1])),
         ]
     };
@@ -52,35 +49,20 @@ pub(super) fn table(found: &Changes) -> Table {
 }
 
 pub(super) fn figure(found: &Changes) -> Figure {
-    let panel = |label: &str, series: Vec<Series>| Panel {
-        title: String::new(),
-        y: Axis {
-            label: label.into(),
-            limits: Some((-2.0, 102.0)),
-            ..Axis::default()
-        },
-        series,
-    };
+    let share = |what: &str| Axis::new(what, "%").within(-2.0, 102.0);
     let dots = |label: &str, style, share: &dyn Fn(&ChangesLine) -> Option<f64>| {
         let lines = found.lines.iter().enumerate();
         let points = lines.filter_map(|(row, line)| Some((place(row), 100.0 * share(line)?)));
         Series::dots(label, style, points.collect())
     };
-    Figure {
-        rows: found.lines.iter().map(|l| l.kind.into()).collect(),
-        panels: vec![
-            panel(
-                "Drives seen to change (%)",
-                vec![dots("", 1, &|l| Some(l.seen as f64 / l.drives.max(1) as f64))],
-            ),
-            panel(
-                "95 % intervals that hold (%)",
-                vec![
-                    dots("whole drives", 1, &|l| l.intervals[0].share()),
-                    dots("pieces", 2, &|l| l.intervals[1].share()),
-                ],
-            ),
-        ],
-        ..Figure::default()
-    }
+    let seen = dots("", 1, &|l| Some(l.seen as f64 / l.drives.max(1) as f64));
+    let held = [
+        dots("whole drives", 1, &|l| l.intervals[0].share()),
+        dots("pieces", 2, &|l| l.intervals[1].share()),
+    ];
+    let panels = [
+        share("Drives seen to change").panel([seen]),
+        share("95 % intervals that hold").panel(held),
+    ];
+    Figure::of_rows(found.lines.iter().map(|l| l.kind), panels)
 }

@@ -1,8 +1,9 @@
 //! What a comparison of laws and drivers shows: a matrix for each metric, what each driver pays, and where a law does not help.
 
+use super::{listed, with_interval};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::compare::{Cell as Pair, CompareResults, Mean, Metric};
+use haptic_batch::compare::{Cell as Pair, CompareResults, LawResult, Mean, Metric, Ratio};
 
 /// Metrics of the terminal's matrices, and of the list of what a law makes worse.
 const FIRST: [&str; 4] = [
@@ -23,89 +24,70 @@ pub fn report(results: &CompareResults) -> Report {
         let name = format!("matrix-{}", metric.name);
         let figure = Block::figure(name, figure(results, place, metric), caption(metric));
         let table = Block::Table(matrix(results, place, metric));
-        let table = if FIRST.contains(&metric.name) {
-            table
-        } else {
-            table.on_page()
-        };
-        [figure, table]
+        let is_first = FIRST.contains(&metric.name);
+        [figure, if is_first { table } else { table.on_page() }]
     });
     let first = &results.laws[0].name;
     let verdicts = vec![Block::Text(judgement(results)), Block::Table(worse(results))];
+    let of_all = vec![Block::Table(ratios(results))];
+    let sections = vec![
+        Section::new("The laws", vec![Block::Table(laws(results))]),
+        Section::new("Laws by drivers", blocks.collect()),
+        Section::new(format!("All drivers, over {first}"), of_all),
+        Section::new(format!("Against {first}"), verdicts),
+    ];
+    let title = format!("Laws and drivers: {}", results.name);
     Report {
-        title: format!("Laws and drivers: {}", results.name),
-        summary: summary(results),
         notes: notes(results),
-        sections: vec![
-            Section::new("The laws", vec![Block::Table(laws(results))]),
-            Section::new("Laws by drivers", blocks.collect()),
-            Section::new(
-                format!("All drivers, over {first}"),
-                vec![Block::Table(ratios(results))],
-            ),
-            Section::new(format!("Against {first}"), verdicts),
-        ],
-        ..Report::default()
+        ..Report::new(title, summary(results), sections)
     }
 }
 
 fn summary(results: &CompareResults) -> String {
     let [losses, silences] = results.instants;
-    let places: Vec<String> = results
-        .places
-        .iter()
-        .map(|(road, kmh)| format!("{road} at {kmh} km/h"))
-        .collect();
+
     format!(
         "{} laws behind the shipping ECU, {} drivers, {}, {} seeds each. In each drive {losses} instants of a sudden loss and {silences} of \
          a silent lane. Intervals are of 95 %, over the seeds.",
         results.laws.len(),
         results.drivers.len(),
-        places.join(", "),
+        listed(&results.places),
         results.seeds
     )
 }
 
+type Count = fn(&Pair) -> usize;
+
 /// Drives of which the means know little.
 fn notes(results: &CompareResults) -> Vec<String> {
-    let name = |pair: &Pair| {
-        format!(
-            "{} with {}",
-            results.laws[pair.law].name, results.drivers[pair.driver][0]
-        )
-    };
-    let counted = |what: &str, count: fn(&Pair) -> usize| {
-        let found: Vec<String> = results
-            .cells
-            .iter()
-            .filter(|pair| count(pair) > 0)
-            .map(|pair| format!("{} ({})", name(pair), count(pair)))
-            .collect();
+    let counted = |(what, count): (&str, Count)| {
+        let found = results.cells.iter().filter(|pair| count(pair) > 0).map(|pair| {
+            let (law, driver) = (&results.laws[pair.law].name, &results.drivers[pair.driver][0]);
+            format!("{law} with {driver} ({})", count(pair))
+        });
+        let found: Vec<String> = found.collect();
         (!found.is_empty()).then(|| format!("{what}: {}", found.join(", ")))
     };
-    let all = [
-        counted(
+    let all: [(&str, Count); 3] = [
+        (
             "drives that left the road, which count as a peak of 10 m",
             |pair| pair.off_road,
         ),
-        counted("failed drives that left the road, likewise", |pair| {
+        ("failed drives that left the road, likewise", |pair| {
             pair.failed_off_road as usize
         }),
-        counted("drives in which the ECU ended guidance by itself", |pair| {
+        ("drives in which the ECU ended guidance by itself", |pair| {
             pair.left_by_itself
         }),
     ];
-    all.into_iter().flatten().collect()
+    all.into_iter().filter_map(counted).collect()
 }
 
 fn laws(results: &CompareResults) -> Table {
-    let row = |law: &haptic_batch::compare::LawResult| {
-        let values: Vec<String> = law
-            .values
-            .iter()
-            .map(|(name, value)| format!("{name} {}", rounded(*value)))
-            .collect();
-        let [before, after] = law.objective.map_or([None; 2], |objective| objective.map(Some));
+    let row = |law: &LawResult| {
+        let value = |(name, value): &(&str, f64)| format!("{name} {}", rounded(*value));
+        let values: Vec<String> = law.values.iter().map(value).collect();
+        let [before, after] = Cell::ends(law.objective, 4);
         let found = match law.oracle && law.objective.is_some() {
             true => "for each driver by itself".into(),
             false => values.join(", "),
@@ -114,8 +96,8 @@ fn laws(results: &CompareResults) -> Table {
             ("Law", Cell::text(&law.name)),
             ("Kind", Cell::text(&law.kind)),
             ("Source", Cell::text(law.source)),
-            ("Objective untuned", Cell::number(before, 4)),
-            ("Tuned", Cell::number(after, 4)),
+            ("Objective untuned", before),
+            ("Tuned", after),
             ("Parameters", Cell::Text(found)),
         ]
     };
@@ -137,24 +119,13 @@ fn ratios(results: &CompareResults) -> Table {
         (1..results.laws.len()).flat_map(|law| (0..results.worlds.len()).map(move |world| (law, world)));
     let row = |(law, world): (usize, usize)| {
         let cell = |metric: &usize| {
-            let found = results
-                .ratios
-                .iter()
-                .find(|ratio| (ratio.law, ratio.world, ratio.metric) == (law, world, *metric));
-            let Some(ratio) = found else {
-                return with_interval(None);
-            };
-            let (largest, driver) = ratio.largest;
-            let name = &results.drivers[driver][0];
-            match with_interval(Some(&ratio.mean)) {
-                Cell::Text(text) => Cell::Text(format!("{text} ({largest:.3} {name})")),
-                other => other,
-            }
+            let is_it = |ratio: &&Ratio| (ratio.law, ratio.world, ratio.metric) == (law, world, *metric);
+            let found = results.ratios.iter().find(is_it);
+            let largest = found.map(|ratio| (ratio.largest.0, &results.drivers[ratio.largest.1][0]));
+            let largest = largest.map_or(String::new(), |(share, name)| format!(" ({share:.3} {name})"));
+            Cell::Text(with_interval(found.map(|ratio| &ratio.mean)) + &largest)
         };
-        let head = [
-            Cell::text(&results.laws[law].name),
-            Cell::text(&results.worlds[world]),
-        ];
+        let head = [&results.laws[law].name, &results.worlds[world]].map(Cell::text);
         head.into_iter().chain(shown.iter().map(cell)).collect()
     };
     let labels = shown.iter().map(|place| results.metrics[*place].label);
@@ -184,24 +155,15 @@ fn has_values(results: &CompareResults, metric: usize) -> bool {
     results.cells.iter().any(|pair| pair.values[metric].is_some())
 }
 
-/// A mean and half of its interval.
-fn with_interval(value: Option<&Mean>) -> Cell {
-    let text = |value: &Mean| match value.interval_95 {
-        Some([low, high]) => format!("{:.3} \u{b1} {:.3}", value.mean, 0.5 * (high - low)),
-        None => format!("{:.3}", value.mean),
-    };
-    Cell::Text(value.map_or("\u{2013}".into(), text))
-}
-
 fn matrix(results: &CompareResults, place: usize, metric: &Metric) -> Table {
-    let of_law = |(number, law): (usize, &haptic_batch::compare::LawResult)| {
+    let of_law = |(number, law): (usize, &LawResult)| {
         let cells = results.cells.iter().filter(|pair| pair.law == number);
-        let values = cells.map(|pair| with_interval(pair.values[place].as_ref()));
+        let values = cells.map(|pair| Cell::Text(with_interval(pair.values[place].as_ref())));
         [Cell::text(&law.name)].into_iter().chain(values).collect()
     };
-    let columns = ["Law".to_owned()]
+    let columns = ["Law"]
         .into_iter()
-        .chain(results.drivers.iter().map(|[name, _]| name.clone()));
+        .chain(results.drivers.iter().map(|[name, _]| name.as_str()));
     let caption = format!("{} ({})", metric.label, metric.unit);
     Table::new(caption, columns, results.laws.iter().enumerate().map(of_law))
 }
@@ -209,25 +171,17 @@ fn matrix(results: &CompareResults, place: usize, metric: &Metric) -> Table {
 fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
     let panel = |(number, [name, _]): (usize, &[String; 2])| {
         let cells = results.cells.iter().filter(|pair| pair.driver == number);
-        let found: Vec<(f64, Mean)> = cells
-            .filter_map(|pair| Some((pair.law as f64 + 1.0, pair.values[place]?)))
-            .collect();
-        let points = found.iter().map(|(x, value)| (*x, value.mean)).collect();
-        let ends = found
-            .iter()
-            .map(|(_, value)| value.interval_95.unwrap_or([value.mean; 2]))
-            .collect();
-        Panel::new(
-            name.clone(),
-            Axis::new(metric.label, metric.unit),
-            vec![Series::with_mark("", 0, Mark::Whiskers(ends), points)],
-        )
+        let found = cells.filter_map(|pair| Some((super::place(pair.law), pair.values[place]?)));
+        let (points, ends) = found
+            .map(|(x, value)| ((x, value.mean), value.interval_95.unwrap_or([value.mean; 2])))
+            .unzip();
+        let series = Series::with_mark("", 0, Mark::Whiskers(ends), points);
+        Panel::new(name, Axis::new(metric.label, metric.unit), [series])
     };
+    let laws = results.laws.iter().map(|law| &law.name);
     Figure {
-        rows: results.laws.iter().map(|law| law.name.clone()).collect(),
         same_y: true,
-        panels: results.drivers.iter().enumerate().map(panel).collect(),
-        ..Figure::default()
+        ..Figure::of_rows(laws, results.drivers.iter().enumerate().map(panel))
     }
 }
 
@@ -235,11 +189,8 @@ fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
 fn clear(results: &CompareResults) -> impl Iterator<Item = (&Pair, &Metric, Mean, bool)> {
     let pairs = results.cells.iter().filter(|pair| pair.law > 0);
     pairs.flat_map(|pair| {
-        let metrics = results
-            .metrics
-            .iter()
-            .zip(&pair.against_first)
-            .filter(|(metric, _)| FIRST.contains(&metric.name));
+        let metrics = results.metrics.iter().zip(&pair.against_first);
+        let metrics = metrics.filter(|(metric, _)| FIRST.contains(&metric.name));
         metrics.filter_map(move |(metric, difference)| {
             let difference = (*difference)?;
             let [low, high] = difference.interval_95?;
@@ -252,11 +203,8 @@ fn clear(results: &CompareResults) -> impl Iterator<Item = (&Pair, &Metric, Mean
 /// How often each law is clearly better and worse than the first, over drivers and the first metrics.
 fn judgement(results: &CompareResults) -> String {
     let told = results.laws.iter().enumerate().skip(1).map(|(number, law)| {
-        let count = |better: bool| {
-            clear(results)
-                .filter(|(pair, _, _, is)| pair.law == number && *is == better)
-                .count()
-        };
+        let clear = || clear(results).filter(|(pair, ..)| pair.law == number);
+        let count = |better: bool| clear().filter(|(.., is)| *is == better).count();
         format!("{}: better {}, worse {}", law.name, count(true), count(false))
     });
     let told: Vec<String> = told.collect();
@@ -279,7 +227,7 @@ fn worse(results: &CompareResults) -> Table {
                 Cell::text(&results.laws[pair.law].name),
                 Cell::text(&results.drivers[pair.driver][0]),
                 Cell::text(metric.label),
-                with_interval(Some(&difference)),
+                Cell::Text(with_interval(Some(&difference))),
             ]
         });
     let caption = format!("Where a law is clearly worse than {}", results.laws[0].name);

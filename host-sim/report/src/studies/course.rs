@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::curves;
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
-use crate::plot::{Axis, Figure, Panel, Series};
+use crate::plot::{Axis, Figure, Series};
 use haptic_batch::course::{Sample, Survey};
+use haptic_log::table::TableWriter;
 use haptic_sim::models::road::Course;
 
 /// Width over height of a panel of a figure, so that a plan has one scale.
@@ -20,15 +21,21 @@ const PICTURE: [usize; 2] = [72, 20];
 /// What could not be written.
 pub fn write_samples(survey: &Survey, directory: &Path) -> Result<(), WriteError> {
     write_file(&directory.join("course.csv"), |f| {
-        writeln!(f, "s_m,x_m,y_m,heading_rad,curvature_1pm,bank_rad,grade,width_m")?;
+        let names = "s_m,x_m,y_m,heading_rad,curvature_1pm,bank_rad,grade,width_m";
+        let mut table = TableWriter::new(f, names.split(','))?;
         for s in &survey.samples {
-            writeln!(
-                f,
-                "{},{},{},{},{},{},{},{}",
-                s.s_m, s.x_m, s.y_m, s.heading_rad, s.curvature_1pm, s.bank_rad, s.grade, s.width_m
-            )?;
+            let place = [s.s_m, s.x_m, s.y_m, s.heading_rad];
+            let lane = [s.curvature_1pm, s.bank_rad, s.grade, s.width_m];
+            table.row(place.into_iter().chain(lane).map(|value| value.to_string()))?;
         }
-        Ok(())
+        table.finish()
+    })
+}
+
+/// The smallest and the largest value.
+fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
     })
 }
 
@@ -43,65 +50,45 @@ fn table(survey: &Survey) -> Table {
         ("Lane width", "m", 3, |s| s.width_m),
     ];
     let row = |(name, unit, decimals, of): (&str, &str, usize, fn(&Sample) -> f64)| {
-        let values = || survey.samples.iter().map(of);
-        vec![
-            Cell::text(name),
-            Cell::number(values().fold(f64::INFINITY, f64::min), decimals),
-            Cell::number(values().fold(f64::NEG_INFINITY, f64::max), decimals),
-            Cell::text(unit),
+        let values = survey.samples.iter().map(of);
+
+        let (least, most) = extent(values);
+        [
+            ("Along the lane's centre", Cell::text(name)),
+            ("Least", Cell::number(least, decimals)),
+            ("Most", Cell::number(most, decimals)),
+            ("Unit", Cell::text(unit)),
         ]
     };
-    Table::new(
-        "",
-        ["Along the lane's centre", "Least", "Most", "Unit"],
-        quantities.into_iter().map(row),
-    )
+    Table::of_rows("", quantities.map(row))
 }
 
 fn plan(survey: &Survey) -> Figure {
     let points: Vec<(f64, f64)> = survey.samples.iter().map(|s| (s.x_m, s.y_m)).collect();
-    let extent = |of: fn(&(f64, f64)) -> f64| {
-        let values = points.iter().map(of);
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v), high.max(v))
-        })
-    };
-    let ((left, right), (low, high)) = (extent(|p| p.0), extent(|p| p.1));
+    let (left, right) = extent(points.iter().map(|p| p.0));
+    let (low, high) = extent(points.iter().map(|p| p.1));
     let height = 1.1 * (high - low).max((right - left) / PANEL_ASPECT).max(1.0);
     let around = |axis: Axis, from: f64, to: f64, size: f64| {
         axis.within(0.5 * (from + to - size), 0.5 * (from + to + size))
     };
-    Figure {
-        x: around(Axis::new("x", "m"), left, right, height * PANEL_ASPECT),
-        panels: vec![Panel {
-            y: around(Axis::new("y", "m"), low, high, height),
-            series: vec![Series::line("", 1, points)],
-            ..Panel::default()
-        }],
-        ..Figure::default()
-    }
+    let panel = around(Axis::new("y", "m"), low, high, height).panel([Series::line("", 1, points)]);
+    around(Axis::new("x", "m"), left, right, height * PANEL_ASPECT).figure([panel])
 }
 
 fn along(survey: &Survey, course: &Course) -> Figure {
-    let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| Panel {
-        title: String::new(),
-        y: Axis::new(quantity, unit),
-        series: vec![Series::line(
-            "",
-            1,
-            survey.samples.iter().map(|s| (s.s_m, value(s))).collect(),
-        )],
+    let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| {
+        let points = survey.samples.iter().map(|s| (s.s_m, value(s)));
+        Axis::new(quantity, unit).panel([Series::line("", 1, points.collect())])
     };
+    let panels = [
+        panel("Curvature", "1/km", |s| 1e3 * s.curvature_1pm),
+        panel("Bank, left up", "%", |s| 100.0 * s.bank_rad.tan()),
+        panel("Grade", "%", |s| 100.0 * s.grade),
+        panel("Lane width", "m", |s| s.width_m),
+    ];
     Figure {
-        x: Axis::new("Distance along the lane's centre", "m"),
-        panels: vec![
-            panel("Curvature", "1/km", |s| 1e3 * s.curvature_1pm),
-            panel("Bank, left up", "%", |s| 100.0 * s.bank_rad.tan()),
-            panel("Grade", "%", |s| 100.0 * s.grade),
-            panel("Lane width", "m", |s| s.width_m),
-        ],
         bands: curves::bands(course),
-        ..Figure::default()
+        ..Axis::new("Distance along the lane's centre", "m").figure(panels)
     }
 }
 
@@ -121,36 +108,28 @@ pub fn report(survey: &Survey, course: &Course) -> Report {
         Block::figure("plan", plan(survey), "Seen from above, in the frame of the file."),
         Block::figure("course", along(survey, course), along_road),
     ];
+    let sections = vec![Section::new("The centre of the lane", blocks)];
     Report {
-        title: "A course".into(),
-        summary: survey.course.clone(),
         notes: survey.notes.clone(),
-        sections: vec![Section::new("The centre of the lane", blocks)],
-        ..Report::default()
+        ..Report::new("A course", &survey.course, sections)
     }
 }
 
 /// The plan in dots, with one scale for both axes; o marks the start.
 fn picture(survey: &Survey) -> String {
     let [columns, rows] = PICTURE;
-    let (mut x, mut y) = (
-        [f64::INFINITY, f64::NEG_INFINITY],
-        [f64::INFINITY, f64::NEG_INFINITY],
-    );
-    for sample in &survey.samples {
-        x = [x[0].min(sample.x_m), x[1].max(sample.x_m)];
-        y = [y[0].min(sample.y_m), y[1].max(sample.y_m)];
-    }
-    let dots = [2 * columns - 1, 4 * rows - 1].map(|n| n as f64);
+    let (left, right) = extent(survey.samples.iter().map(|s| s.x_m));
+    let (low, high) = extent(survey.samples.iter().map(|s| s.y_m));
     // A dot is as wide as it is high where a character is twice as high as wide.
-    let scale = ((x[1] - x[0]) / dots[0]).max((y[1] - y[0]) / dots[1]).max(1e-3);
-    let used = (((y[1] - y[0]) / scale) as usize / 4 + 1).min(rows);
+    let dots = [2 * columns - 1, 4 * rows - 1].map(|n| n as f64);
+    let scale = ((right - left) / dots[0]).max((high - low) / dots[1]).max(1e-3);
+    let used = (((high - low) / scale) as usize / 4 + 1).min(rows);
     let mut cells = vec![vec![0_u8; columns]; used];
     // Bits of a Braille character by row and column of its dots.
     const BITS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
     let place = |sample: &Sample| {
-        let column = ((sample.x_m - x[0]) / scale) as usize;
-        let row = ((y[1] - sample.y_m) / scale) as usize;
+        let column = ((sample.x_m - left) / scale) as usize;
+        let row = ((high - sample.y_m) / scale) as usize;
         [column.min(2 * columns - 1), row.min(4 * used - 1)]
     };
     for sample in &survey.samples {
@@ -169,6 +148,6 @@ fn picture(survey: &Survey) -> String {
         text.push_str(drawn.trim_end());
         text.push('\n');
     }
-    text.push_str(&format!("(o: start; {:.0} m from left to right)\n", x[1] - x[0]));
+    text.push_str(&format!("(o: start; {:.0} m from left to right)\n", right - left));
     text
 }

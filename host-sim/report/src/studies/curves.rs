@@ -33,13 +33,12 @@ pub(super) fn bands(course: &Course) -> Vec<Band> {
         let largest = most.max(-least);
         if largest > STRAIGHT_1PM {
             let dark = most - least <= ARC * largest;
-            bands.push(Band {
-                label: if dark { "arc" } else { changing }.into(),
-                from,
-                to,
-                shade: if dark { Shade::Dark } else { Shade::Light },
-                panel: None,
-            });
+            let (label, shade) = if dark {
+                ("arc", Shade::Dark)
+            } else {
+                (changing, Shade::Light)
+            };
+            bands.push(Band::new(label, [from, to], shade));
         }
         from = to;
     }
@@ -48,12 +47,9 @@ pub(super) fn bands(course: &Course) -> Vec<Band> {
 
 /// Stretches of a run without guidance, with why.
 pub(super) fn unguided(stretches: &[Unguided]) -> impl Iterator<Item = Band> {
-    stretches.iter().map(|stretch| Band {
-        label: format!("no guidance: {}", stretch.why),
-        from: stretch.from_m,
-        to: stretch.to_m,
-        shade: Shade::Alert,
-        panel: None,
+    stretches.iter().map(|stretch| {
+        let label = format!("no guidance: {}", stretch.why);
+        Band::new(label, [stretch.from_m, stretch.to_m], Shade::Alert)
     })
 }
 

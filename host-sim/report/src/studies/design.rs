@@ -14,15 +14,10 @@ pub fn report(answer: &DesignResult) -> Report {
         Block::Table(table(answer)),
     ];
     blocks.extend(sentences(answer).into_iter().map(Block::Text));
-    Report {
-        title: format!("Which experiment tells {}", answer.parameter),
-        summary: format!(
-            "Wanted: a standard error of {} of {}.",
-            answer.error, answer.parameter
-        ),
-        sections: vec![Section::new("Designs", blocks)],
-        ..Report::default()
-    }
+    let (parameter, error) = (&answer.parameter, answer.error);
+    let summary = format!("Wanted: a standard error of {error} of {parameter}.");
+    let sections = vec![Section::new("Designs", blocks)];
+    Report::new(format!("Which experiment tells {parameter}"), summary, sections)
 }
 
 fn form(design: &Design) -> String {
@@ -37,35 +32,24 @@ fn form(design: &Design) -> String {
 /// Every design, the best one marked.
 fn table(answer: &DesignResult) -> Table {
     let row = |(i, d): (usize, &Design)| {
-        let mut cells = vec![
-            Cell::Text(if answer.best == Some(i) {
-                "best".into()
-            } else {
-                String::new()
-            }),
-            Cell::Text(d.course.clone()),
-            Cell::Text(form(d)),
-            Cell::number(d.amplitude_nm, 2),
-            Cell::number(d.needed_s.map(|s| s / 60.0), 1),
+        let head = [
+            ("", Cell::text(if answer.best == Some(i) { "best" } else { "" })),
+            ("Course", Cell::text(&d.course)),
+            ("Probe", Cell::Text(form(d))),
+            ("N.m", Cell::number(d.amplitude_nm, 2)),
+            ("Minutes needed", Cell::number(d.needed_s.map(|s| s / 60.0), 1)),
         ];
-        cells.extend(
-            d.standard_errors
-                .iter()
-                .map(|&e| Cell::number(e.is_finite().then_some(e), 4)),
-        );
-        cells
+        let error = |(name, error)| (format!("error {name}"), Cell::number(error, 4));
+        let errors = INFORMED.into_iter().zip(d.standard_errors).map(error);
+        let head = head.into_iter().map(|(name, cell)| (name.to_owned(), cell));
+        head.chain(errors)
     };
-    let mut columns: Vec<String> = ["", "Course", "Probe", "N.m", "Minutes needed"]
-        .map(String::from)
-        .to_vec();
-    columns.extend(INFORMED.map(|n| format!("error {n}")));
     let once = answer.designs.first().map_or(0.0, |d| d.span_s);
-    Table::new(
+    Table::of_rows(
         format!(
             "Least standard errors after once over the course (the first: {once:.0} s), and how long {} takes to {}.",
             answer.parameter, answer.error
         ),
-        columns,
         answer.designs.iter().enumerate().map(row),
     )
 }
@@ -132,11 +116,8 @@ fn figure(answer: &DesignResult) -> Figure {
     let mut courses: Vec<&str> = answer.designs.iter().map(|d| d.course.as_str()).collect();
     courses.dedup();
     let minutes = |d: &Design| d.needed_s.map_or(f64::NAN, |s| s / 60.0);
-    let all = answer
-        .designs
-        .iter()
-        .flat_map(|d| d.frequencies_hz.iter().copied());
-    let quickest_hz = all.fold(0.0, f64::max);
+    let all = answer.designs.iter().flat_map(|d| &d.frequencies_hz);
+    let quickest_hz = all.copied().fold(0.0, f64::max);
     let panels = courses.into_iter().map(|course| {
         let here = || answer.designs.iter().filter(move |d| d.course == course);
         let with = |sines: usize, amplitude_nm: f64| {
@@ -161,15 +142,8 @@ fn figure(answer: &DesignResult) -> Figure {
             Some(s) => format!(", {:.1} min without a probe", s / 60.0),
             None => ", no drive is long enough without a probe".into(),
         });
-        Panel::new(
-            format!("{course}{}", without.unwrap_or_default()),
-            Axis::new("Drive needed", "min"),
-            series.collect(),
-        )
+        let title = format!("{course}{}", without.unwrap_or_default());
+        Panel::new(title, Axis::new("Drive needed", "min"), series)
     });
-    Figure {
-        x: Axis::new("Frequency of the probe", "Hz"),
-        panels: panels.collect(),
-        ..Figure::default()
-    }
+    Axis::new("Frequency of the probe", "Hz").figure(panels)
 }

@@ -1,7 +1,8 @@
 //! Several drivers beside each other: what differs between two, and what a group is like.
 
+use super::place;
 use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use crate::plot::{Axis, Figure, Mark, Series};
 use haptic_analysis::identify::{Difference, Population, value_and_error};
 use haptic_batch::identify::Drivers;
 
@@ -17,15 +18,12 @@ pub fn report(found: &Drivers) -> Report {
     );
     let mut blocks = vec![Block::figure("drivers", figure(found), caption)];
     blocks.extend(tables(found).into_iter().map(Block::Table));
-    Report {
-        title: format!("{} drivers", found.drivers.len()),
-        summary: "Every drive is a driver of its own. Of a drive in pieces each is listed, and the longest one is compared.".into(),
-        sections: vec![Section::new("Drivers", blocks)],
-        ..Report::default()
-    }
+    let title = format!("{} drivers", found.drivers.len());
+    let summary = "Every drive is a driver of its own. Of a drive in pieces each is listed, and the longest one is compared.";
+    Report::new(title, summary, vec![Section::new("Drivers", blocks)])
 }
 
-fn number(value: Option<f64>) -> Cell {
+fn number(value: impl Into<Option<f64>>) -> Cell {
     Cell::number(value, 4)
 }
 
@@ -45,9 +43,8 @@ fn tables(found: &Drivers) -> Vec<Table> {
 fn gaps(found: &Drivers) -> String {
     let of = |wanted: &str| {
         let missing = found.drivers.iter().enumerate().filter(|(_, (_, fit))| {
-            let list = fit.parameters.list();
-            list.iter()
-                .any(|l| l.0 == wanted && value_and_error(l.2).is_none())
+            let mut list = fit.parameters.list().into_iter();
+            list.any(|l| l.0 == wanted && value_and_error(l.2).is_none())
         });
         let numbers: Vec<String> = missing.map(|(i, _)| (i + 1).to_string()).collect();
         (!numbers.is_empty()).then(|| format!("{wanted} of {}", numbers.join(", ")))
@@ -65,39 +62,32 @@ fn gaps(found: &Drivers) -> String {
 fn each(found: &Drivers) -> Table {
     let rows = found.drivers.iter().map(|(name, fit)| {
         let list = fit.parameters.list();
-        let mut cells = vec![Cell::Text(name.clone())];
+        let mut cells = vec![("Drive", Cell::text(name))];
         for wanted in SHOWN {
             let p = list.iter().find(|l| l.0 == wanted).map(|l| l.2);
-            cells.push(number(p.and_then(|p| p.estimate)));
-            cells.push(number(p.and_then(|p| p.standard_error)));
+            cells.push((wanted, number(p.and_then(|p| p.estimate))));
+            cells.push(("+-", number(p.and_then(|p| p.standard_error))));
         }
-        let refuted = fit.refuted.first().map_or_else(String::new, |r| r.cause.clone());
-        cells.push(Cell::Text(refuted));
+        let refuted = fit.refuted.first().map_or("", |r| &r.cause);
+        cells.push(("Refuted", Cell::text(refuted)));
         cells
     });
-    let mut columns = vec!["Drive".to_owned()];
-    for name in SHOWN {
-        columns.extend([name.to_owned(), "+-".to_owned()]);
-    }
-    columns.push("Refuted".to_owned());
-    Table::new("Each driver; a dash: not identified.", columns, rows)
+    Table::of_rows("Each driver; a dash: not identified.", rows)
 }
 
 fn differences(found: &[Difference]) -> Table {
     let row = |d: &Difference| {
-        let [low, high] = d.interval_95;
+        let [low, high] = Cell::ends(d.interval_95, 4);
+        let verdict = if d.real { "they differ" } else { "not told apart" };
         [
             ("", Cell::text(d.parameter)),
             ("Unit", Cell::text(d.unit)),
-            ("Difference", number(Some(d.difference))),
-            ("Standard error", number(Some(d.standard_error))),
-            ("95 % from", number(Some(low))),
-            ("to", number(Some(high))),
-            ("p (Holm)", number(Some(d.p_holm))),
-            (
-                "Verdict",
-                Cell::Text(if d.real { "they differ" } else { "not told apart" }.into()),
-            ),
+            ("Difference", number(d.difference)),
+            ("Standard error", number(d.standard_error)),
+            ("95 % from", low),
+            ("to", high),
+            ("p (Holm)", number(d.p_holm)),
+            ("Verdict", Cell::text(verdict)),
         ]
     };
     Table::of_rows(
@@ -115,13 +105,13 @@ fn population(found: &[Population], gaps: &str) -> Table {
         [
             ("", Cell::text(p.parameter)),
             ("Unit", Cell::text(p.unit)),
-            ("Drivers", Cell::number(p.drivers as f64, 0)),
-            ("Mean", number(Some(p.mean))),
-            ("95 % from", number(Some(p.mean_interval_95[0]))),
-            ("to", number(Some(p.mean_interval_95[1]))),
-            ("Spread", number(Some(p.spread))),
-            ("95 % from", number(Some(p.spread_interval_95[0]))),
-            ("to", number(Some(p.spread_interval_95[1]))),
+            ("Drivers", Cell::count(p.drivers)),
+            ("Mean", number(p.mean)),
+            ("95 % from", number(p.mean_interval_95[0])),
+            ("to", number(p.mean_interval_95[1])),
+            ("Spread", number(p.spread)),
+            ("95 % from", number(p.spread_interval_95[0])),
+            ("to", number(p.spread_interval_95[1])),
         ]
     };
     Table::of_rows(
@@ -136,12 +126,8 @@ fn figure(found: &Drivers) -> Figure {
     let panels = SHOWN.iter().map(|&wanted| {
         let mut series = Vec::new();
         if let Some(p) = found.population.iter().find(|p| p.parameter == wanted) {
-            series.push(Series::interval(
-                "mean of the group, 95 %",
-                5,
-                &ends,
-                &[p.mean_interval_95; 2],
-            ));
+            let interval = [p.mean_interval_95; 2];
+            series.push(Series::interval("mean of the group, 95 %", 5, &ends, &interval));
         }
         let (mut points, mut intervals, mut unit) =
             ([const { Vec::new() }; 2], [const { Vec::new() }; 2], "-");
@@ -151,23 +137,20 @@ fn figure(found: &Drivers) -> Figure {
             unit = named.map_or(unit, |l| l.1);
             let Some(p) = named.map(|l| l.2) else { continue };
             if let (Some((x, _)), Some(interval)) = (value_and_error(p), p.interval_95) {
-                let place = usize::from(!p.identified);
-                points[place].push(((i + 1) as f64, x));
-                intervals[place].push(interval);
+                let kind = usize::from(!p.identified);
+                points[kind].push((place(i), x));
+                intervals[kind].push(interval);
             }
         }
         let labels = ["own drive", "own drive, not identified"];
-        for (place, (points, intervals)) in points.into_iter().zip(intervals).enumerate() {
+        for (kind, (points, intervals)) in points.into_iter().zip(intervals).enumerate() {
             if !points.is_empty() {
                 let mark = Mark::Whiskers(intervals);
-                series.push(Series::with_mark(labels[place], [1, 3][place], mark, points));
+                series.push(Series::with_mark(labels[kind], [1, 3][kind], mark, points));
             }
         }
-        Panel::new("", Axis::new(wanted, unit), series)
+        Axis::new(wanted, unit).panel(series)
     });
-    Figure {
-        x: Axis::counting("Driver, as the table lists them").within(ends[0], ends[1]),
-        panels: panels.collect(),
-        ..Figure::default()
-    }
+    let x = Axis::counting("Driver, as the table lists them").within(ends[0], ends[1]);
+    x.figure(panels)
 }

@@ -57,18 +57,14 @@ fn provenance(evaluation: &Evaluation) -> Provenance {
 
 /// The main metrics of each run.
 fn table(results: &EvaluationResults) -> Table {
-    table_of(results, "The main metrics of each run.", |d| {
-        IN_SHORT.contains(&d.name)
-    })
+    let in_short = |d: &Definition| IN_SHORT.contains(&d.name);
+    table_of(results, "The main metrics of each run.", in_short)
 }
 
 fn nominal_figure(evaluation: &Evaluation) -> Figure {
     let shown = |s: &Scenario| s.failure().kind == FailureKind::None;
-    panels(
-        evaluation,
-        "Lateral error by reliance on the guidance",
-        &[("", &shown)],
-    )
+    let title = "Lateral error by reliance on the guidance";
+    panels(evaluation, title, &[("", &shown)])
 }
 
 /// The manual run has no guidance to fail; it is drawn as what the others fall back to.
@@ -91,32 +87,18 @@ fn handover_figure(evaluation: &Evaluation) -> Figure {
     );
     let fails = |kind| move |s: &Scenario| s.failure().kind == kind || s.condition() == Condition::Manual;
     let (lost, handed_over) = (fails(FailureKind::Torque), fails(FailureKind::Input));
-    let mut figure = panels(
-        evaluation,
-        &title,
-        &[(": torque lost", &lost), (": handed over", &handed_over)],
-    );
+    let kinds: [Shown; 2] = [(": torque lost", &lost), (": handed over", &handed_over)];
+    let mut figure = panels(evaluation, &title, &kinds);
     figure.markers.extend(failure_marker(evaluation));
     figure
 }
 
 /// Where the guidance fails, if that is in the figure.
 fn failure_marker(evaluation: &Evaluation) -> Option<Marker> {
-    let failed = evaluation
-        .runs
-        .iter()
-        .find(|(s, _)| s.failure().kind == FailureKind::Torque);
-    let place = failed.and_then(|(scenario, run)| {
-        let time_s = scenario.failure().at_s()?;
-        run.trace.samples.iter().find(|sample| sample.time_s >= time_s)
-    });
+    let mut runs = evaluation.runs.iter();
+    let (scenario, run) = runs.find(|(s, _)| s.failure().kind == FailureKind::Torque)?;
     let [from, to] = evaluation.results.window_m;
-    place
-        .filter(|sample| (from..=to).contains(&sample.s_m))
-        .map(|sample| Marker {
-            label: "failure".into(),
-            x: sample.s_m,
-        })
+    super::failure_marker(scenario, &run.trace.samples).filter(|marker| (from..=to).contains(&marker.x))
 }
 
 /// What a panel's title ends with, and which runs it shows.
@@ -128,42 +110,30 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
     let (mut panels, mut absences) = (Vec::new(), Vec::new());
     for (number, t_p) in DRIVERS_T_P.iter().enumerate() {
         for (ending, shown) in kinds {
-            let runs = evaluation
-                .runs
-                .iter()
-                .filter(|(s, _)| s.driver().t_p == *t_p && shown(s));
+            let runs = evaluation.runs.iter();
+            let runs = runs.filter(|(s, _)| s.driver().t_p == *t_p && shown(s));
             absences.extend(absent(runs.clone(), panels.len()));
             // A condition has the same style in all figures.
             let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
-            let path = |run: &Run| {
-                run.trace
-                    .samples
-                    .iter()
-                    .map(|s| (s.s_m, s.lateral_error_m))
-                    .collect()
-            };
-            panels.push(Panel::new(
-                format!("Driver {} (t_p {t_p} s){ending}", number + 1),
-                Axis::new("Lateral error", "m"),
-                runs.flat_map(|(s, run)| {
-                    let line = Series::line(label(s.condition()), style(s.condition()), path(run));
-                    ended(line, run.diverged().then_some(LEFT_THE_ROAD))
-                })
-                .collect(),
-            ));
+            let lines = runs.flat_map(|(s, run)| {
+                let path = run.trace.samples.iter().map(|s| (s.s_m, s.lateral_error_m));
+                let line = Series::line(label(s.condition()), style(s.condition()), path.collect());
+                ended(line, run.diverged().then_some(LEFT_THE_ROAD))
+            });
+            let title = format!("Driver {} (t_p {t_p} s){ending}", number + 1);
+            panels.push(Panel::new(title, Axis::new("Lateral error", "m"), lines));
         }
     }
     let [from, to] = evaluation.results.window_m;
     let course = evaluation.runs.first().map(|(scenario, _)| scenario.course());
     let bands = course.map(curves::bands).unwrap_or_default().into_iter();
     let bands = bands.chain(absences);
+    let x = Axis::new("Distance along the road", "m").within(from, to);
     Figure {
         title: title.into(),
-        x: Axis::new("Distance along the road", "m").within(from, to),
         same_y: true,
-        panels,
         bands: bands.filter(|band| band.from < to && band.to > from).collect(),
-        ..Figure::default()
+        ..x.figure(panels)
     }
 }
 
@@ -181,11 +151,8 @@ fn absent<'a>(runs: impl Iterator<Item = &'a (Scenario, Run)>, panel: usize) -> 
         match bands.iter_mut().find(touches) {
             Some(band) => band.to = band.to.max(stretch.to_m),
             None => bands.push(Band {
-                label: why,
-                from: stretch.from_m,
-                to: stretch.to_m,
-                shade: Shade::Alert,
                 panel: Some(panel),
+                ..Band::new(why, [stretch.from_m, stretch.to_m], Shade::Alert)
             }),
         }
     }
@@ -211,14 +178,11 @@ pub fn report(evaluation: &Evaluation) -> Report {
     let results = &evaluation.results;
     let failure_s = results.failure_time_s;
     // All runs have the same.
-    let speed = evaluation
-        .runs
-        .first()
-        .map_or_else(String::new, |(scenario, _)| scenario.speed().to_string());
-    let course = if results.course == PAPER_COURSE {
-        "The course is this project's own: the paper prints no numbers for its own. "
-    } else {
-        ""
+    let first = evaluation.runs.first();
+    let speed = first.map_or_else(String::new, |(scenario, _)| scenario.speed().to_string());
+    let course = match results.course == PAPER_COURSE {
+        true => "The course is this project's own: the paper prints no numbers for its own. ",
+        false => "",
     };
     let [from, to] = results.window_m;
     let nominal = "Lateral error from the centreline, left positive, without failure.";
@@ -238,37 +202,29 @@ pub fn report(evaluation: &Evaluation) -> Report {
     };
     let all = DEFINITIONS.chunks(9).map(some);
     let all = all.chain([Block::Table(definitions_table()).on_page()]);
+    let summary = format!(
+        "Three drivers under four conditions on {}, {speed}, the shipping controller in the loop, sensors: {}. {course}Metrics \
+         are taken over {from} to {to} m of {:.0} m of road, failure at {failure_s} s.",
+        results.course,
+        format!("{:?}", results.sensors).to_lowercase(),
+        results.course_length_m,
+    );
+    let figure8 = figure("figure8", nominal_figure(evaluation), nominal.into());
+    let figure9 = figure("figure9", failure_figure(evaluation), lost);
+    let handover = figure("figure9_handover", handover_figure(evaluation), handed_over);
+    let in_short = vec![Block::Table(table(results)), Block::Text(LEGEND.into())];
+    let sections = vec![
+        Section::new("Reliance on the guidance (figure 8)", figure8),
+        Section::new("Failure of the guidance (figure 9)", figure9),
+        Section::new("Failure of the guidance's input", handover),
+        Section::new("Results", in_short),
+        Section::new("What it must show", vec![Block::Table(claims_table(results))]),
+        Section::new("All metrics", all.collect()),
+    ];
     Report {
-        title: "Evaluation of shared steering control".into(),
-        summary: format!(
-            "Three drivers under four conditions on {}, {speed}, the shipping controller in the loop, sensors: {}. {course}Metrics \
-             are taken over {from} to {to} m of {:.0} m of road, failure at {failure_s} s.",
-            results.course,
-            format!("{:?}", results.sensors).to_lowercase(),
-            results.course_length_m,
-        ),
         notes: results.notes.clone(),
-        sections: vec![
-            Section::new(
-                "Reliance on the guidance (figure 8)",
-                figure("figure8", nominal_figure(evaluation), nominal.into()),
-            ),
-            Section::new(
-                "Failure of the guidance (figure 9)",
-                figure("figure9", failure_figure(evaluation), lost),
-            ),
-            Section::new(
-                "Failure of the guidance's input",
-                figure("figure9_handover", handover_figure(evaluation), handed_over),
-            ),
-            Section::new(
-                "Results",
-                vec![Block::Table(table(results)), Block::Text(LEGEND.into())],
-            ),
-            Section::new("What it must show", vec![Block::Table(claims_table(results))]),
-            Section::new("All metrics", all.collect()),
-        ],
         provenance: provenance(evaluation),
+        ..Report::new("Evaluation of shared steering control", summary, sections)
     }
 }
 
@@ -282,11 +238,10 @@ fn claims_table(results: &EvaluationResults) -> Table {
     };
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
-        [holds, claim.claim.as_str(), &claim.evidence]
-            .map(Cell::text)
-            .to_vec()
+        let cells = [holds, &claim.claim, &claim.evidence].map(Cell::text);
+        ["Verdict", "Claim", "Evidence"].into_iter().zip(cells)
     });
-    Table::new(caption, ["Verdict", "Claim", "Evidence"], rows)
+    Table::of_rows(caption, rows)
 }
 
 fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
@@ -303,11 +258,8 @@ fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definiti
             "end of course".into()
         };
         let texts = [r.condition.to_string(), r.failure.to_string(), ended].map(Cell::Text);
-        [Cell::number(r.t_p, 1)]
-            .into_iter()
-            .chain(texts)
-            .chain(left(r))
-            .collect()
+        let t_p = [Cell::number(r.t_p, 1)].into_iter();
+        t_p.chain(texts).chain(left(r)).collect()
     };
     let rows: Vec<(Vec<Cell>, _)> = results.runs.iter().map(|r| (keys(r), r.metrics)).collect();
     let keys = ["t_p (s)", "Condition", "Failure", "Ended", "Guidance ended"];

@@ -41,43 +41,26 @@ fn paths(drive: &Drive) -> Figure {
         let left = found.trajectory_error_m.is_none().then_some(LEFT_THE_ROAD);
         ended(Series::line(label, style, found.path.clone()), left)
     };
+    let lines = [Series::line("measured", 0, drive.path.clone())]
+        .into_iter()
+        .chain(again("identified driver", 1, &drive.noise_model))
+        .chain(again("identified driver, published method", 3, &drive.paper));
+    let panel = Axis::new("Lateral error", "m").panel(lines);
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::new("Distance along the road", "m"),
-        panels: vec![Panel::new(
-            "",
-            Axis::new("Lateral error", "m"),
-            [Series::line("measured", 0, drive.path.clone())]
-                .into_iter()
-                .chain(again("identified driver", 1, &drive.noise_model))
-                .chain(again("identified driver, published method", 3, &drive.paper))
-                .collect(),
-        )],
-        ..Figure::default()
+        ..Axis::new("Distance along the road", "m").figure([panel])
     }
 }
 
 fn torque(drive: &Drive) -> Figure {
     let t = &drive.noise_model.identification.traces;
-    let line = |label: &str, style, y: &[f64]| {
-        Series::line(
-            label,
-            style,
-            t.time_s.iter().copied().zip(y.iter().copied()).collect(),
-        )
-    };
+    let panel = Axis::new("Driver torque", "N.m").panel([
+        Series::through("measured", 0, &t.time_s, &t.measured_nm),
+        Series::through("simulated", 3, &t.time_s, &t.simulated_nm),
+    ]);
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::new("Time", "s"),
-        panels: vec![Panel::new(
-            "",
-            Axis::new("Driver torque", "N.m"),
-            vec![
-                line("measured", 0, &t.measured_nm),
-                line("simulated", 3, &t.simulated_nm),
-            ],
-        )],
-        ..Figure::default()
+        ..Axis::new("Time", "s").figure([panel])
     }
 }
 
@@ -112,10 +95,10 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
         Panel::new(title, Axis::new("Trajectory error", "m"), series)
     });
     Figure {
-        x: Axis::counting("Participant").within(ends[0], ends[1]),
-        panels: panels.to_vec(),
         same_y: true,
-        ..Figure::default()
+        ..Axis::counting("Participant")
+            .within(ends[0], ends[1])
+            .figure(panels)
     }
 }
 
@@ -132,64 +115,46 @@ fn estimates(experiment: &Experiment) -> Figure {
         let k_hg = &d.paper.identification.parameters.k_hg;
         Some((f64::from(d.participant) + ASIDE, k_hg.optimum?))
     });
-    Figure {
-        x: Axis::counting("Participant"),
-        panels: vec![Panel::new(
-            "",
-            Axis::new("K_hg", "-"),
-            vec![
-                Series::dots("truth", 0, truth.collect()),
-                Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),
-                Series::dots("published method", 3, published.collect()),
-            ],
-        )],
-        ..Figure::default()
-    }
+    let panel = Axis::new("K_hg", "-").panel([
+        Series::dots("truth", 0, truth.collect()),
+        Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),
+        Series::dots("published method", 3, published.collect()),
+    ]);
+    Axis::counting("Participant").figure([panel])
 }
 
 /// The document of the experiment. Every drive follows from the published drivers, the probe and the seed.
 pub fn report(experiment: &Experiment) -> Report {
+    let errors =
+        "Mean distance between the path of the drive and that of the identified driver without remnant.";
+    let k_hg = "K_hg of the guided drives. A driver without an estimate by the noise model is one whose data do not identify it.";
+    let path = "A typical participant: the path of the drive, and of the drivers identified from it.";
+    let simulated = "The same participant: driver torque, measured and simulated by the default method.";
     let mut again = vec![
         Block::Table(trajectory_table(experiment)),
         Block::Text(means(experiment)),
-        Block::figure(
-            "trajectory_errors",
-            trajectory_errors(experiment),
-            "Mean distance between the path of the drive and that of the identified driver without remnant.",
-        ),
-        Block::figure(
-            "k_hg",
-            estimates(experiment),
-            "K_hg of the guided drives. A driver without an estimate by the noise model is one whose data do not identify it.",
-        ),
+        Block::figure("trajectory_errors", trajectory_errors(experiment), errors),
+        Block::figure("k_hg", estimates(experiment), k_hg),
     ];
     if let Some(drive) = typical(experiment) {
-        again.push(Block::figure(
-            "paths",
-            paths(drive),
-            "A typical participant: the path of the drive, and of the drivers identified from it.",
-        ));
-        again.push(Block::figure(
-            "torque",
-            torque(drive),
-            "The same participant: driver torque, measured and simulated by the default method.",
-        ));
+        again.push(Block::figure("paths", paths(drive), path));
+        again.push(Block::figure("torque", torque(drive), simulated));
     }
     let truth = |guided| vec![Block::Table(truth_table(experiment, guided))];
+    let summary = format!(
+        "The participants of tables 5 and 6 as drivers with a remnant on {}, which is ours; probe {} N.m, seed {}. Truth beside \
+         estimate; a dash where the data do not identify a parameter. {FIT_IS_CALIBRATED}.",
+        experiment.course, experiment.probe_nm, experiment.seed,
+    );
+    let sections = vec![
+        Section::new("Manual", truth(false)),
+        Section::new("With guidance", truth(true)),
+        Section::new("The identified drivers drive again", again),
+    ];
+    let title = format!("{} drives, identified", experiment.drives.len());
     Report {
-        title: format!("{} drives, identified", experiment.drives.len()),
-        summary: format!(
-            "The participants of tables 5 and 6 as drivers with a remnant on {}, which is ours; probe {} N.m, seed {}. Truth beside \
-             estimate; a dash where the data do not identify a parameter. {FIT_IS_CALIBRATED}.",
-            experiment.course, experiment.probe_nm, experiment.seed,
-        ),
         notes: left(experiment).into_iter().collect(),
-        sections: vec![
-            Section::new("Manual", truth(false)),
-            Section::new("With guidance", truth(true)),
-            Section::new("The identified drivers drive again", again),
-        ],
-        ..Report::default()
+        ..Report::new(title, summary, sections)
     }
 }
 
@@ -227,11 +192,7 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
         ("t_p", |p| &p.t_p, 3),
         ("K_hg", |p| &p.k_hg, 3),
     ];
-    let shown = if guided { 5 } else { 4 };
-    let mut headings = vec!["Participant".to_owned(), "Method".to_owned(), "Fit %".to_owned()];
-    for (name, ..) in &columns[..shown] {
-        headings.extend([(*name).to_owned(), format!("{name} error")]);
-    }
+    let shown = &columns[..if guided { 5 } else { 4 }];
     let mut rows = Vec::new();
     for drive in experiment.drives.iter().filter(|d| d.guided == guided) {
         let t = &drive.truth;
@@ -244,34 +205,36 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
         ];
         let start = |method: &str, fit: f64| {
             vec![
-                Cell::Text(drive.participant.to_string()),
-                Cell::text(method),
-                Cell::number(fit, 1),
+                ("Participant".into(), Cell::Text(drive.participant.to_string())),
+                ("Method".into(), Cell::text(method)),
+                ("Fit %".into(), Cell::number(fit, 1)),
             ]
         };
+        let both = |name: &str, value, error| [(name.into(), value), (format!("{name} error"), error)];
         let mut row = start("truth", t.fitness);
-        for (value, (_, _, decimals)) in truths.into_iter().zip(&columns[..shown]) {
-            row.push(Cell::number(value, *decimals));
-            row.push(Cell::Text(String::new()));
+        for (value, (name, _, decimals)) in truths.into_iter().zip(shown) {
+            row.extend(both(name, Cell::number(value, *decimals), Cell::text("")));
         }
         rows.push(row);
-        for finding in [&drive.noise_model, &drive.paper] {
-            let mut row = start(finding.identification.method, finding.identification.fit_percent);
-            for (_, parameter, decimals) in &columns[..shown] {
-                let p = parameter(&finding.identification.parameters);
+        for found in [&drive.noise_model, &drive.paper].map(|finding| &finding.identification) {
+            let mut row = start(found.method, found.fit_percent);
+            for (name, parameter, decimals) in shown {
+                let p = parameter(&found.parameters);
                 // The published method names a number whatever the data say; it is shown as it would be printed.
-                let paper = finding.identification.method == "paper";
-                let value = if paper { p.optimum } else { p.estimate };
-                row.push(Cell::number(value, *decimals));
-                row.push(Cell::number(p.standard_error, *decimals));
+                let value = if found.method == "paper" {
+                    p.optimum
+                } else {
+                    p.estimate
+                };
+                let error = Cell::number(p.standard_error, *decimals);
+                row.extend(both(name, Cell::number(value, *decimals), error));
             }
             rows.push(row);
         }
     }
-    Table::new(
+    Table::of_rows(
         "Parameters with their standard errors; the truth's fit is the paper's. The published method's \
                   come as it would print them, on a bound or not, with errors that are too small where its residuals are not white.",
-        headings,
         rows,
     )
 }
@@ -279,22 +242,18 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
 /// How far the identified drivers drive from those that they were identified from.
 fn trajectory_table(experiment: &Experiment) -> Table {
     let [low, mean, high] = experiment.published_trajectory_error_m;
-    let rows = experiment.drives.iter().map(|d| {
-        let number = |value| Cell::number(value, 3);
-        vec![
-            Cell::Text(d.participant.to_string()),
-            Cell::Text(if d.guided { "guided" } else { "manual" }.into()),
-            number(d.noise_model.trajectory_error_m),
-            number(d.paper.trajectory_error_m),
+    let row = |d: &Drive| {
+        [
+            ("Participant", Cell::Text(d.participant.to_string())),
+            ("Drive", Cell::text(if d.guided { "guided" } else { "manual" })),
+            ("Noise model", Cell::number(d.noise_model.trajectory_error_m, 3)),
+            ("Published method", Cell::number(d.paper.trajectory_error_m, 3)),
         ]
-    });
-    Table::new(
-        format!(
-            "Mean absolute trajectory error, m. The paper's, of people with guidance: {low} to {high}, mean {mean}."
-        ),
-        ["Participant", "Drive", "Noise model", "Published method"],
-        rows,
-    )
+    };
+    let caption = format!(
+        "Mean absolute trajectory error, m. The paper's, of people with guidance: {low} to {high}, mean {mean}."
+    );
+    Table::of_rows(caption, experiment.drives.iter().map(row))
 }
 
 /// Which drives, recorded or driven again, were not guided throughout; none if all were.

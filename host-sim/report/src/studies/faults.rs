@@ -1,5 +1,6 @@
 //! What is shown of a fault campaign: a table, a figure, and runs told one by one.
 
+use super::place;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_campaign::campaign::{Campaign, CaseResult};
@@ -20,25 +21,18 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
     let mut blocks = vec![
         Block::figure("faults", figure(campaign), caption),
         Block::Table(table(campaign)),
+        Block::Text(limits(campaign)),
     ];
-    blocks.push(Block::Text(limits(campaign)));
     blocks.extend(campaign.too_often().map(|row| Block::Text(left_too_often(row))));
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
+    let how_often = vec![Block::Table(shares(campaign)), Block::Text(SHARES.into())];
     let mut sections = vec![
         Section::new("Fault by fault", blocks),
-        Section::new(
-            "How often, how soon, how far",
-            vec![Block::Table(shares(campaign)), Block::Text(SHARES.into())],
-        ),
+        Section::new("How often, how soon, how far", how_often),
         Section::new("Class by class", vec![Block::Table(by_class(campaign))]),
     ];
     sections.extend(told);
-    Report {
-        title: "Every fault by name".into(),
-        summary: summary(campaign),
-        sections,
-        ..Report::default()
-    }
+    Report::new("Every fault by name", summary(campaign), sections)
 }
 
 /// What the ECU reported in a run.
@@ -49,14 +43,9 @@ pub fn report_of_run(case: &FaultCase, outcome: TrialOutcome) -> Section {
     };
     let onset_s = f64::from(outcome.onset_ms) * 1e-3;
     let (injected, driver) = (&case.injected, outcome.driver);
-    let text = format!(
-        "{}: {injected}; {driver}, {speed}, fault at {onset_s:.3} s",
-        case.name
-    );
-    Section::new(
-        case.name,
-        vec![Block::Text(text), Block::Events(outcome.reported)],
-    )
+    let name = case.name;
+    let text = format!("{name}: {injected}; {driver}, {speed}, fault at {onset_s:.3} s");
+    Section::new(name, vec![Block::Text(text), Block::Events(outcome.reported)])
 }
 
 /// How much ran, and how much of it failed.
@@ -113,6 +102,10 @@ fn left_too_often(row: &CaseResult) -> String {
 const SHARES: &str = "Noticed: the ECU reported a fault after the onset, or left. Intervals of shares are Wilson's, 95 %; times count from \
                       the onset, over the runs in which something was noticed; deviations are of all runs.";
 
+fn time(ms: Option<u32>) -> Cell {
+    Cell::number(ms.map(f64::from), 0)
+}
+
 fn percent(count: u64, runs: u64) -> Cell {
     Cell::number(100.0 * count as f64 / runs as f64, 1)
 }
@@ -124,11 +117,10 @@ fn shares(campaign: &Campaign) -> Table {
         Cell::Text(format!("{low:.1} to {high:.1}"))
     };
     let row = |row: &CaseResult| {
-        let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);
         let [median, most] = row.noticed_after_ms;
         [
             ("Fault", Cell::text(row.name)),
-            ("Runs", Cell::number(row.runs as f64, 0)),
+            ("Runs", Cell::count(row.runs)),
             ("Noticed (%)", percent(row.noticed, row.runs)),
             ("of (%)", interval(row.noticed_interval)),
             ("Median (ms)", time(median)),
@@ -144,39 +136,28 @@ fn shares(campaign: &Campaign) -> Table {
 
 /// Sums of the rows of each class that the limits judge ([`CaseResult::is_limited`]).
 fn by_class(campaign: &Campaign) -> Table {
+    let limited = || campaign.rows.iter().filter(|row| row.is_limited);
     let row = |class: Class| {
-        let rows: Vec<&CaseResult> = campaign
-            .rows
-            .iter()
-            .filter(|row| row.class == class && row.is_limited)
-            .collect();
+        let rows: Vec<&CaseResult> = limited().filter(|row| row.class == class).collect();
         let sum = |of: fn(&CaseResult) -> u64| rows.iter().map(|row| of(row)).sum::<u64>();
         let most =
             |of: fn(&CaseResult) -> Option<f64>| rows.iter().filter_map(|row| of(row)).reduce(f64::max);
+        let (runs, worst_m) = (sum(|row| row.runs), most(|row| Some(row.deviation_m)));
         [
             ("Class", Cell::Text(class.to_string())),
-            ("Rows", Cell::number(rows.len() as f64, 0)),
-            ("Runs", Cell::number(sum(|row| row.runs) as f64, 0)),
-            (
-                "Left lane (%)",
-                percent(sum(|row| row.left_lane), sum(|row| row.runs)),
-            ),
-            (
-                "Worst deviation (m)",
-                Cell::number(most(|row| Some(row.deviation_m)), 2),
-            ),
+            ("Rows", Cell::count(rows.len())),
+            ("Runs", Cell::count(runs)),
+            ("Left lane (%)", percent(sum(|row| row.left_lane), runs)),
+            ("Worst deviation (m)", Cell::number(worst_m, 2)),
             ("Excess (m)", Cell::number(most(|row| row.excess_m), 2)),
             ("Pushed (m)", Cell::number(most(|row| row.pushed_m), 2)),
         ]
     };
-    let classes = Class::ALL.into_iter();
-    let there = classes.filter(|&class| {
-        campaign
-            .rows
-            .iter()
-            .any(|row| row.class == class && row.is_limited)
-    });
-    Table::of_rows("Rows that the limits judge", there.map(row))
+    let there = |class: &Class| limited().any(|row| row.class == *class);
+    Table::of_rows(
+        "Rows that the limits judge",
+        Class::ALL.into_iter().filter(there).map(row),
+    )
 }
 
 /// A run that failed, and how to run it again.
@@ -189,10 +170,7 @@ fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
 
 /// Fault by fault.
 fn table(campaign: &Campaign) -> Table {
-    let count = |n: u64| Cell::number(n as f64, 0);
     let row = |row: &CaseResult| {
-        let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);
-        let metres = |value: Option<f64>| Cell::number(value, 2);
         let verdict = match row.failures.len() {
             0 if row.leaves_too_often => "FAIL".into(),
             0 => "pass".into(),
@@ -202,24 +180,21 @@ fn table(campaign: &Campaign) -> Table {
             ("Fault", Cell::text(row.name)),
             ("Class", Cell::Text(row.class.to_string())),
             ("Verdict", Cell::Text(verdict)),
-            ("Runs", count(row.runs)),
-            ("Seen", count(row.seen)),
-            ("Cycles", count(row.cycles)),
+            ("Runs", Cell::count(row.runs)),
+            ("Seen", Cell::count(row.seen)),
+            ("Cycles", Cell::count(row.cycles)),
             ("Reaction (ms)", time(row.deadline_ms.and(row.worst_reaction_ms))),
             ("Deadline (ms)", time(row.deadline_ms)),
             ("Peak torque (N.m)", Cell::number(row.peak_torque_nm, 3)),
             ("Bound (N.m)", Cell::number(row.torque_bound_nm, 1)),
-            ("ECU left", count(row.left)),
-            (
-                "After (ms)",
-                Cell::number(row.left_after_ms.map(|[median, _]| f64::from(median)), 0),
-            ),
+            ("ECU left", Cell::count(row.left)),
+            ("After (ms)", time(row.left_after_ms.map(|[median, _]| median))),
             ("Deviation (m)", Cell::number(row.deviation_m, 2)),
-            ("Dropped (m)", metres(row.dropped_m)),
-            ("Excess (m)", metres(row.excess_m)),
-            ("Pushed (m)", metres(row.pushed_m)),
-            ("Left lane", count(row.left_lane)),
-            ("Off road", count(row.off_road)),
+            ("Dropped (m)", Cell::number(row.dropped_m, 2)),
+            ("Excess (m)", Cell::number(row.excess_m, 2)),
+            ("Pushed (m)", Cell::number(row.pushed_m, 2)),
+            ("Left lane", Cell::count(row.left_lane)),
+            ("Off road", Cell::count(row.off_road)),
         ]
     };
     Table::of_rows("", campaign.rows.iter().map(row))
@@ -230,45 +205,35 @@ fn table(campaign: &Campaign) -> Table {
 fn figure(campaign: &Campaign) -> Figure {
     let of = |value: &dyn Fn(&CaseResult) -> Option<f64>| -> Vec<(f64, f64)> {
         let rows = campaign.rows.iter().enumerate();
-        rows.filter_map(|(i, row)| Some((i as f64 + 1.0, value(row)?)))
+        rows.filter_map(|(i, row)| Some((place(i), value(row)?)))
             .collect()
     };
+    let worst = |points| Series::with_mark("worst seen", 1, Mark::Stems, points);
     let reaction = of(&|row| {
         let deadline_ms = row.deadline_ms.filter(|ms| *ms > 0)?;
         Some(100.0 * f64::from(row.worst_reaction_ms?) / f64::from(deadline_ms))
     });
     let names = 1.0..=campaign.rows.len() as f64;
     let bound = vec![(names.start() - 0.5, 100.0), (names.end() + 0.5, 100.0)];
-    let panel = |title: &str, y: Axis, series: Vec<Series>| Panel::new(title, y, series);
-    Figure {
-        rows: campaign.rows.iter().map(|row| row.name.into()).collect(),
-        panels: vec![
-            panel(
-                "Worst reaction",
-                Axis::new("Share of the deadline", "%"),
-                vec![
-                    Series::line("deadline", 3, bound),
-                    Series::with_mark("worst seen", 1, Mark::Stems, reaction),
-                ],
-            ),
-            panel(
-                "Largest torque",
-                Axis::new("Torque", "N.m"),
-                vec![
-                    Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.peak_torque_nm))),
-                    Series::dots("bound of the torque", 3, of(&|row| Some(row.torque_bound_nm))),
-                ],
-            ),
-            panel(
-                "Largest deviation",
-                // What goes further is off the road.
-                Axis::new("Deviation", "m").within(0.0, OFF_ROAD_M),
-                vec![
-                    Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.deviation_m))),
-                    Series::dots("torque dropped", 4, of(&|row| row.dropped_m)),
-                ],
-            ),
-        ],
-        ..Figure::default()
-    }
+    let reactions = [Series::line("deadline", 3, bound), worst(reaction)];
+    let torques = [
+        worst(of(&|row| Some(row.peak_torque_nm))),
+        Series::dots("bound of the torque", 3, of(&|row| Some(row.torque_bound_nm))),
+    ];
+    let deviations = [
+        worst(of(&|row| Some(row.deviation_m))),
+        Series::dots("torque dropped", 4, of(&|row| row.dropped_m)),
+    ];
+    // What goes further is off the road.
+    let on_the_road = Axis::new("Deviation", "m").within(0.0, OFF_ROAD_M);
+    let panels = [
+        Panel::new(
+            "Worst reaction",
+            Axis::new("Share of the deadline", "%"),
+            reactions,
+        ),
+        Panel::new("Largest torque", Axis::new("Torque", "N.m"), torques),
+        Panel::new("Largest deviation", on_the_road, deviations),
+    ];
+    Figure::of_rows(campaign.rows.iter().map(|row| row.name), panels)
 }

@@ -3,18 +3,14 @@
 use std::path::Path;
 
 use super::OutputError;
-use crate::document::{Block, Report, write_file};
+use crate::document::{Block, Report, write_bytes};
 use crate::plot::Figure;
 
 /// A figure as `NAME.svg` and `NAME.png`.
 fn write_figure(directory: &Path, name: &str, figure: &Figure) -> Result<(), OutputError> {
     let (svg, png) = (figure.to_svg()?, figure.to_png()?);
-    write_file(&directory.join(format!("{name}.svg")), |f| {
-        f.write_all(svg.as_bytes())
-    })?;
-    Ok(write_file(&directory.join(format!("{name}.png")), |f| {
-        f.write_all(&png)
-    })?)
+    write_bytes(&directory.join(format!("{name}.svg")), svg)?;
+    Ok(write_bytes(&directory.join(format!("{name}.png")), png)?)
 }
 
 /// The figures of a report, and the report itself as `report.html`.
@@ -27,8 +23,5 @@ pub fn write(report: &Report, directory: &Path) -> Result<(), OutputError> {
             write_figure(directory, name, figure)?;
         }
     }
-    let html = report.to_html()?;
-    Ok(write_file(&directory.join("report.html"), |f| {
-        f.write_all(html.as_bytes())
-    })?)
+    Ok(write_bytes(&directory.join("report.html"), report.to_html()?)?)
 }

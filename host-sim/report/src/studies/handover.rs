@@ -26,14 +26,10 @@ pub fn report(results: &HandoverResults) -> Report {
         Block::Table(table(results)),
         Block::Text(judgement),
     ];
-    Report {
-        title: "What a lost input costs".into(),
-        summary: "Peak lateral error in the first curve of paper-course, stretched to the speed (0.93 m/s2), failure in the \
-                  arc. Ratio: over the larger of the no-failure and the manual peak."
-            .into(),
-        sections: vec![Section::new("Handover beside sudden loss", blocks)],
-        ..Report::default()
-    }
+    let summary = "Peak lateral error in the first curve of paper-course, stretched to the speed (0.93 m/s2), failure in the \
+                   arc. Ratio: over the larger of the no-failure and the manual peak.";
+    let sections = vec![Section::new("Handover beside sudden loss", blocks)];
+    Report::new("What a lost input costs", summary, sections)
 }
 
 /// Every row of the study.
@@ -65,26 +61,18 @@ fn table(results: &HandoverResults) -> Table {
 /// A panel for each driver that is judged: ratios over the speed.
 fn figure(results: &HandoverResults) -> Figure {
     let conditions = [(Condition::High, 1), (Condition::Mid, 2)];
+    let (slowest, fastest) = (SPEEDS_KMH[0], SPEEDS_KMH[SPEEDS_KMH.len() - 1]);
     let panel = |t_p: f64| {
-        let mut series = vec![Series::line(
-            "most that is allowed",
-            0,
-            vec![
-                (SPEEDS_KMH[0], results.most),
-                (SPEEDS_KMH[SPEEDS_KMH.len() - 1], results.most),
-            ],
-        )];
+        let most = vec![(slowest, results.most), (fastest, results.most)];
+        let mut series = vec![Series::line("most that is allowed", 0, most)];
         for (condition, style) in conditions {
-            let rows = || {
-                results
+            let points = |ratio: fn(&HandoverRow) -> Option<f64>| {
+                let value = |r: &HandoverRow| if r.is_judged() { ratio(r) } else { None };
+                let rows = results
                     .rows
                     .iter()
-                    .filter(move |r| r.t_p == t_p && r.condition == condition)
-            };
-            let points = |ratio: fn(&HandoverRow) -> Option<f64>| {
-                let value = move |r: &HandoverRow| if r.is_judged() { ratio(r) } else { None };
-                rows()
-                    .map(move |r| (r.speed_kmh, value(r).unwrap_or(f64::NAN)))
+                    .filter(|r| r.t_p == t_p && r.condition == condition);
+                rows.map(|r| (r.speed_kmh, value(r).unwrap_or(f64::NAN)))
                     .collect::<Vec<_>>()
             };
             for (what, style, points) in [
@@ -96,16 +84,12 @@ fn figure(results: &HandoverResults) -> Figure {
                 series.extend(ended(line, (!to_the_end).then_some(UNSTABLE)));
             }
         }
-        Panel::new(
-            format!("Driver with t_p {t_p} s"),
-            Axis::new("Ratio", "-"),
-            series,
-        )
+        let title = format!("Driver with t_p {t_p} s");
+        Panel::new(title, Axis::new("Ratio", "-"), series)
     };
+    let x = Axis::new("Speed", "km/h").within(slowest - 2.0, fastest + 2.0);
     Figure {
-        x: Axis::new("Speed", "km/h").within(SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0),
         same_y: true,
-        panels: DRIVERS_T_P.map(panel).to_vec(),
-        ..Figure::default()
+        ..x.figure(DRIVERS_T_P.map(panel))
     }
 }

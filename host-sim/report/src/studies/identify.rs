@@ -1,10 +1,13 @@
 //! What one identification shows: measured and simulated torque (as the paper's figure 6), the residuals, the driver over time,
 //! the parameters and what they rest on.
 
-use super::pieces;
+use super::{pieces, place};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
-use haptic_analysis::identify::{History, Identification, Parameter, Reason, autocorrelation};
+use haptic_analysis::identify::{
+    Combination, History, Identification, InputCorrelation, LeftOut, Parameter, Reason, Refutation,
+    autocorrelation,
+};
 use haptic_batch::identify::IdentifiedDrive;
 
 /// Lags of the autocorrelation drawn.
@@ -12,14 +15,6 @@ const LAGS: usize = 60;
 
 /// Highest value of the delay's profile that is drawn: so that the level of 95 %, 3.84, is seen well above the axis.
 const HIGHEST: f64 = 15.0;
-
-fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
-    Series::line(label, style, x.iter().copied().zip(y.iter().copied()).collect())
-}
-
-fn panel(quantity: &str, unit: &str, series: Vec<Series>) -> Panel {
-    Panel::new("", Axis::new(quantity, unit), series)
-}
 
 /// What a line or an area breaks at: a place between rows that are no neighbours, from whose values nothing is drawn.
 fn broken<T: Copy>(x: &[f64], y: &[T], nothing: T) -> (Vec<f64>, Vec<T>) {
@@ -39,7 +34,7 @@ fn broken<T: Copy>(x: &[f64], y: &[T], nothing: T) -> (Vec<f64>, Vec<T>) {
 /// A line that is broken where the rows are.
 fn broken_line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
     let (x, y) = broken(x, y, f64::NAN);
-    line(label, style, &x, &y)
+    Series::through(label, style, &x, &y)
 }
 
 /// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %; none if t_p was given.
@@ -61,75 +56,54 @@ fn delay_profile(found: &Identification) -> Option<Figure> {
     let ends = [*x.first()?, *x.last()?];
     let mut series = Vec::new();
     if let Some([low, high]) = found.parameters.t_p.interval_95 {
-        series.push(Series::interval(
-            "95 % interval",
-            5,
-            &[low, high],
-            &[[0.0, HIGHEST]; 2],
-        ));
+        let ends = [[0.0, HIGHEST]; 2];
+        series.push(Series::interval("95 % interval", 5, &[low, high], &ends));
     }
-    series.push(line("profile", 0, &x, &y));
-    series.push(line("level of 95 %", 1, &ends, &[3.84, 3.84]));
-    let mut panel = panel("-2 log L above optimum", "-", series);
-    panel.y.limits = Some((0.0, HIGHEST));
-    Some(over(Axis::new("t_p", "s"), vec![panel]))
+    series.push(Series::through("profile", 0, &x, &y));
+    series.push(Series::through("level of 95 %", 1, &ends, &[3.84, 3.84]));
+    let y = Axis::new("-2 log L above optimum", "-").within(0.0, HIGHEST);
+    Some(Axis::new("t_p", "s").figure([y.panel(series)]))
 }
 
 /// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed; none if there
 /// are no intervals.
 fn intervals(found: &Identification) -> Option<Figure> {
-    let list: Vec<_> = found
-        .parameters
-        .list()
-        .into_iter()
-        .filter_map(|(name, _, p)| {
-            let at = p.optimum.filter(|&at| !p.fixed && at.abs() > 1e-9)?;
-            Some((name, at, p.interval_95?))
-        })
-        .collect();
+    let known = |(name, _, p): (&'static str, _, &Parameter)| {
+        let at = p.optimum.filter(|&at| !p.fixed && at.abs() > 1e-9)?;
+        Some((name, at, p.interval_95?))
+    };
+    let list: Vec<_> = found.parameters.list().into_iter().filter_map(known).collect();
     if list.is_empty() {
         return None;
     }
     let (mut wide, mut narrow) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
     for (i, (name, at, interval)) in list.iter().enumerate() {
-        let place = (i + 1) as f64;
+        let place = place(i);
         wide.0.push((place - 0.12, 1.0));
         wide.1.push(interval.map(|x| x / at));
-        let of = found
-            .at_t_nms
-            .as_ref()
-            .and_then(|a| a.intervals_95.iter().find(|n| n.0 == *name));
-        if let Some((_, ends)) = of {
+        let of = found.at_t_nms.as_ref();
+        if let Some((_, ends)) = of.and_then(|a| a.intervals_95.iter().find(|n| n.0 == *name)) {
             narrow.0.push((place + 0.12, 1.0));
             narrow.1.push(ends.map(|x| x / at));
         }
     }
-    let label = if is_published(found) {
-        "interval as published"
-    } else {
-        "95 % interval"
+    let label = match is_published(found) {
+        true => "interval as published",
+        false => "95 % interval",
     };
     let mut series = vec![Series::with_mark(label, 0, Mark::Whiskers(wide.1), wide.0)];
     if !narrow.0.is_empty() {
-        series.push(Series::with_mark(
-            "if t_nms is as assumed",
-            1,
-            Mark::Whiskers(narrow.1),
-            narrow.0,
-        ));
+        let mark = Mark::Whiskers(narrow.1);
+        series.push(Series::with_mark("if t_nms is as assumed", 1, mark, narrow.0));
     }
-    Some(Figure {
-        rows: list.iter().map(|l| l.0.to_owned()).collect(),
-        panels: vec![panel("Share of the estimate", "-", series)],
-        ..Figure::default()
-    })
+    let panel = Axis::new("Share of the estimate", "-").panel(series);
+    Some(Figure::of_rows(list.iter().map(|l| l.0), [panel]))
 }
 
-fn over(x: Axis, panels: Vec<Panel>) -> Figure {
+fn over_time(found: &Identification, panels: impl IntoIterator<Item = Panel>) -> Figure {
     Figure {
-        x,
-        panels,
-        ..Figure::default()
+        bands: left_out_bands(found),
+        ..Axis::new("Time", "s").figure(panels)
     }
 }
 
@@ -143,46 +117,30 @@ fn torque(found: &Identification) -> Figure {
     if !left_out_bands(found).is_empty() {
         series.push(broken_line("measured, left out", 4, &t.unused_s, &t.unused_nm));
     }
-    let mut figure = over(
-        Axis::new("Time", "s"),
-        vec![panel("Driver torque", "N.m", series)],
-    );
-    figure.bands = left_out_bands(found);
-    figure
+    over_time(found, [Axis::new("Driver torque", "N.m").panel(series)])
 }
 
 /// What was left out, and why.
 fn left_out_bands(found: &Identification) -> Vec<Band> {
     let left_out = found.preflight.iter().flat_map(|p| &p.left_out);
-    left_out
-        .map(|l| Band {
-            label: format!("left out: {}", l.reason),
-            from: l.from_s,
-            to: l.to_s,
-            shade: if l.reason == Reason::Asked {
-                Shade::Light
-            } else {
-                Shade::Dark
-            },
-            panel: None,
-        })
-        .collect()
+    let band = |l: &LeftOut| {
+        let is_asked = l.reason == Reason::Asked;
+        let shade = if is_asked { Shade::Light } else { Shade::Dark };
+        Band::new(format!("left out: {}", l.reason), [l.from_s, l.to_s], shade)
+    };
+    left_out.map(band).collect()
 }
 
 fn residuals(found: &Identification) -> Figure {
     let t = &found.traces;
     let both = t.measured_nm.iter().zip(&t.simulated_nm);
     let unexplained: Vec<f64> = both.map(|(y, m)| y - m).collect();
-    let panel = |what: &str, y: &[f64]| panel(what, "N.m", vec![broken_line("", 1, &t.time_s, y)]);
-    let mut figure = over(
-        Axis::new("Time", "s"),
-        vec![
-            panel("Measured - simulated", &unexplained),
-            panel("Residual of the loss", &t.residual_nm),
-        ],
-    );
-    figure.bands = left_out_bands(found);
-    figure
+    let panel = |what: &str, y: &[f64]| Axis::new(what, "N.m").panel([broken_line("", 1, &t.time_s, y)]);
+    let panels = [
+        panel("Measured - simulated", &unexplained),
+        panel("Residual of the loss", &t.residual_nm),
+    ];
+    over_time(found, panels)
 }
 
 fn correlogram(found: &Identification) -> Figure {
@@ -194,36 +152,29 @@ fn correlogram(found: &Identification) -> Figure {
         Series::interval("95 % if white", 5, &[0.5, last + 0.5], &[[-bound, bound]; 2]),
         Series::with_mark("", 0, Mark::Stems, stems),
     ];
-    over(
-        Axis::counting("Lag (samples)"),
-        vec![panel("Autocorrelation", "-", series)],
-    )
+    let panel = Axis::new("Autocorrelation", "-").panel(series);
+    Axis::counting("Lag (samples)").figure([panel])
 }
 
-fn over_time(drive: &IdentifiedDrive) -> Figure {
+fn followed(drive: &IdentifiedDrive) -> Figure {
     let t = &drive.tracking;
     let panel = |name: &str, unit: &str, h: &History| {
         let both = h.estimate.iter().zip(&h.standard_deviation);
         let ends: Vec<[f64; 2]> = both.map(|(e, s)| [e - 2.0 * s, e + 2.0 * s]).collect();
         let (x, ends) = broken(&t.time_s, &ends, [f64::NAN; 2]);
-        let series = vec![
+        Axis::new(name, unit).panel([
             Series::interval("two standard deviations", 5, &x, &ends),
             broken_line("estimate", 1, &t.time_s, &h.estimate),
-        ];
-        panel(name, unit, series)
+        ])
     };
-    let mut figure = over(
-        Axis::new("Time", "s"),
-        vec![
-            panel("K_hg", "-", &t.k_hg),
-            panel("gain_1", "N.m/m", &t.gain[0]),
-            panel("gain_2", "N.m/(m.s)", &t.gain[1]),
-            panel("gain_3", "N.m/rad", &t.gain[2]),
-            panel("t_p", "s", &t.t_p),
-        ],
-    );
-    figure.bands = left_out_bands(&drive.results.identification);
-    figure
+    let panels = [
+        panel("K_hg", "-", &t.k_hg),
+        panel("gain_1", "N.m/m", &t.gain[0]),
+        panel("gain_2", "N.m/(m.s)", &t.gain[1]),
+        panel("gain_3", "N.m/rad", &t.gain[2]),
+        panel("t_p", "s", &t.t_p),
+    ];
+    over_time(&drive.results.identification, panels)
 }
 
 /// What is known of the driver, and what it rests on.
@@ -232,25 +183,20 @@ fn verdict_blocks(found: &Identification) -> Vec<Block> {
     let mut verdict: Vec<Block> = sentences.map(Block::Text).collect();
     verdict.push(Block::Table(parameters(found)));
     let shown = |name, figure: Option<Figure>, caption| figure.map(|f| Block::figure(name, f, caption));
-    verdict.extend(shown(
-        "intervals",
-        intervals(found),
-        if is_published(found) {
+    let beside = match is_published(found) {
+        true => {
             "The intervals as the published method has them: 95 % only where its residuals do not refute them."
-        } else {
-            "The 95 % intervals, and what they would be if t_nms were what is assumed."
-        },
-    ));
-    verdict.extend(shown(
-        "delay_profile",
-        delay_profile(found),
-        "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.",
-    ));
+        }
+        false => "The 95 % intervals, and what they would be if t_nms were what is assumed.",
+    };
+    let valley =
+        "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.";
+    verdict.extend(shown("intervals", intervals(found), beside));
+    verdict.extend(shown("delay_profile", delay_profile(found), valley));
     if !found.assumed.is_empty() {
         let assumed = found.assumed.join("; ");
-        verdict.push(Block::Text(format!(
-            "Assumed, for the log cannot show it: {assumed}."
-        )));
+        let text = format!("Assumed, for the log cannot show it: {assumed}.");
+        verdict.push(Block::Text(text));
     }
     verdict.extend(found.notes.iter().cloned().map(Block::Text));
     verdict.push(Block::Table(combinations(found)));
@@ -261,32 +207,21 @@ fn verdict_blocks(found: &Identification) -> Vec<Block> {
 /// The document of an identification.
 pub fn report(drive: &IdentifiedDrive) -> Report {
     let found = &drive.results.identification;
+    let fitted =
+        "Driver torque, measured and simulated from the inputs alone. Shaded: what was left out, and why.";
     let fit = vec![
-        Block::figure(
-            "torque",
-            torque(found),
-            "Driver torque, measured and simulated from the inputs alone. Shaded: what was left out, and why.",
-        ),
+        Block::figure("torque", torque(found), fitted),
         Block::Table(Table::of_pairs(["", ""], facts(found))),
     ];
+    let made_of = "What the driver model leaves over, and what the loss is made of.";
+    let correlated = "Autocorrelation of the residuals of the loss.";
     let left_over = vec![
-        Block::figure(
-            "residuals",
-            residuals(found),
-            "What the driver model leaves over, and what the loss is made of.",
-        ),
-        Block::figure(
-            "autocorrelation",
-            correlogram(found),
-            "Autocorrelation of the residuals of the loss.",
-        ),
+        Block::figure("residuals", residuals(found), made_of),
+        Block::figure("autocorrelation", correlogram(found), correlated),
         Block::Table(input_tests(found)),
     ];
-    let followed = Block::figure(
-        "over_time",
-        over_time(drive),
-        "The same drive followed by the constrained Kalman filter, for drivers who change.",
-    );
+    let by_filter = "The same drive followed by the constrained Kalman filter, for drivers who change.";
+    let followed = Block::figure("over_time", followed(drive), by_filter);
     let in_pieces = drive.results.pieces.as_ref().zip(pieces::figure(drive));
     let in_pieces = in_pieces.map(|(pieces, figure)| {
         let figure = Block::figure("pieces", figure, pieces::CAPTION);
@@ -303,15 +238,10 @@ pub fn report(drive: &IdentifiedDrive) -> Report {
         Section::new("Over time", vec![followed]),
     ];
     let first = in_pieces.into_iter().chain(in_the_log);
-    Report {
-        title: format!("Driver of {}", drive.name),
-        summary: format!(
-            "Method {}, {} rows. The fit of the driver torque is {:.1} %.",
-            found.method, found.rows, found.fit_percent
-        ),
-        sections: first.chain(always).chain(again).collect(),
-        ..Report::default()
-    }
+    let (method, rows, fit) = (found.method, found.rows, found.fit_percent);
+    let summary = format!("Method {method}, {rows} rows. The fit of the driver torque is {fit:.1} %.");
+    let sections = first.chain(always).chain(again).collect();
+    Report::new(format!("Driver of {}", drive.name), summary, sections)
 }
 
 /// What was found in the log and done about it.
@@ -326,7 +256,7 @@ fn in_the_log(found: &Identification) -> Option<Table> {
 
 /// What the record refutes, a sentence each.
 fn refutations(found: &Identification) -> Vec<String> {
-    let sentence = |r: &haptic_analysis::identify::Refutation| {
+    let sentence = |r: &Refutation| {
         format!(
             "Refuted: {}. Evidence: {}. Likeliest cause: {}. Cure: {}.",
             r.assumption, r.evidence, r.cause, r.cure
@@ -345,16 +275,12 @@ fn verdicts(found: &Identification) -> Vec<String> {
         _ => "how much the driver resists the guidance (0 gives way, 1 resists)",
     };
     let told = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
-    let list = found
-        .parameters
-        .list()
-        .into_iter()
-        .filter(|l| told.contains(&l.0));
+    let list = found.parameters.list().into_iter();
+    let list = list.filter(|l| told.contains(&l.0));
     list.filter_map(|(name, unit, p)| {
-        let unit = if unit == "-" {
-            String::new()
-        } else {
-            format!(" {unit}")
+        let unit = match unit {
+            "-" => String::new(),
+            unit => format!(" {unit}"),
         };
         let what = meaning(name);
         if p.fixed {
@@ -417,26 +343,23 @@ fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
     let row = |name: &str, cell| vec![Cell::text(name), cell];
     let left = again.away.when_and_why();
     let left = left.map(|left| row("guidance ended", Cell::Text(left)));
+    let metrics = &again.metrics;
+    let rows = [
+        row("peak lateral error (m)", number(metrics.peak_lateral_error_m)),
+        row(
+            "mean absolute lateral error (m)",
+            number(metrics.mean_abs_lateral_error_m),
+        ),
+        row("left the road", Cell::text(left_road)),
+    ];
     Some(Table::new(
         "The identified driver on the course.",
         ["", ""],
-        vec![
-            row(
-                "peak lateral error (m)",
-                number(again.metrics.peak_lateral_error_m),
-            ),
-            row(
-                "mean absolute lateral error (m)",
-                number(again.metrics.mean_abs_lateral_error_m),
-            ),
-            row("left the road", Cell::text(left_road)),
-        ]
-        .into_iter()
-        .chain(left),
+        rows.into_iter().chain(left),
     ))
 }
 
-fn number(value: Option<f64>) -> Cell {
+fn number(value: impl Into<Option<f64>>) -> Cell {
     Cell::number(value, 4)
 }
 
@@ -446,68 +369,59 @@ fn parameters(found: &Identification) -> Table {
         let at = found.at_t_nms.as_ref().filter(|_| found.refuted.is_empty())?;
         at.intervals_95.iter().find(|i| i.0 == name).map(|i| i.1)
     };
-    let (caption, from) = if is_published(found) {
-        (
-            "The values, errors and intervals of the published method as it prints them, whether the record holds them or not.",
-            "As published: from",
-        )
+    let published = is_published(found);
+    let caption = match published {
+        true => {
+            "The values, errors and intervals of the published method as it prints them, whether the record holds them or not."
+        }
+        false => "An estimate is given only where the data identify the parameter.",
+    };
+    let from = if published {
+        "As published: from"
     } else {
-        (
-            "An estimate is given only where the data identify the parameter.",
-            "95 % from",
-        )
+        "95 % from"
     };
     let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
     let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
-    let rows = found
-        .parameters
-        .list()
-        .into_iter()
-        .chain(beyond)
-        .map(|(name, unit, p)| {
-            let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
-            let verdict = match (p.fixed, p.identified, p.on_bound) {
-                (true, ..) => "given",
-                _ if is_published(found) => published_verdict(found, p),
-                (_, true, true) => "identified, on a bound",
-                (_, true, false) => "identified",
-                (_, false, true) => "not identified, on a bound",
-                (_, false, false) => "not identified",
-            };
-            let estimate = if is_published(found) {
-                p.optimum
-            } else {
-                p.estimate
-            };
-            [
-                ("", Cell::text(name)),
-                ("Unit", Cell::text(unit)),
-                ("Verdict", Cell::text(verdict)),
-                ("Estimate", number(estimate)),
-                ("Standard error", number(p.standard_error)),
-                (from, number(low)),
-                ("to", number(high)),
-                ("t_nms known: from", number(narrow(name).map(|i| i[0]))),
-                ("to", number(narrow(name).map(|i| i[1]))),
-            ]
-        });
-    Table::of_rows(caption, rows)
+    let row = |(name, unit, p): (&'static str, &'static str, &Parameter)| {
+        let verdict = match (p.fixed, p.identified, p.on_bound) {
+            (true, ..) => "given",
+            _ if published => published_verdict(found, p),
+            (_, true, true) => "identified, on a bound",
+            (_, true, false) => "identified",
+            (_, false, true) => "not identified, on a bound",
+            (_, false, false) => "not identified",
+        };
+        let estimate = if published { p.optimum } else { p.estimate };
+        let [low, high] = Cell::ends(p.interval_95, 4);
+        let [narrow_low, narrow_high] = Cell::ends(narrow(name), 4);
+        [
+            ("", Cell::text(name)),
+            ("Unit", Cell::text(unit)),
+            ("Verdict", Cell::text(verdict)),
+            ("Estimate", number(estimate)),
+            ("Standard error", number(p.standard_error)),
+            (from, low),
+            ("to", high),
+            ("t_nms known: from", narrow_low),
+            ("to", narrow_high),
+        ]
+    };
+    let all = found.parameters.list().into_iter().chain(beyond);
+    Table::of_rows(caption, all.map(row))
 }
 
 /// What the data determine where they do not determine each parameter.
 fn combinations(found: &Identification) -> Table {
-    let row = |c: &haptic_analysis::identify::Combination| {
-        vec![
-            Cell::Text(c.name.clone()),
-            number(Some(c.estimate)),
-            number(Some(c.standard_error)),
+    let row = |c: &Combination| {
+        [
+            ("Combination", Cell::text(&c.name)),
+            ("Estimate", number(c.estimate)),
+            ("Standard error", number(c.standard_error)),
         ]
     };
-    Table::new(
-        "What the data determine instead.",
-        ["Combination", "Estimate", "Standard error"],
-        found.combinations.iter().map(row),
-    )
+    let caption = "What the data determine instead.";
+    Table::of_rows(caption, found.combinations.iter().map(row))
 }
 
 /// Correlation of the errors.
@@ -527,11 +441,9 @@ fn correlation(found: &Identification) -> Table {
 
 /// What else is known of the fit, name and value.
 fn facts(found: &Identification) -> Vec<(String, String)> {
-    let mut facts = vec![(
-        "Fit of the torque".to_owned(),
-        format!("{:.2} %", found.fit_percent),
-    )];
+    let mut facts = Vec::new();
     let mut add = |name: &str, text: String| facts.push((name.into(), text));
+    add("Fit of the torque", format!("{:.2} %", found.fit_percent));
     if let Some(fit) = found.fit_percent_predicted {
         add("Fit of the one-step prediction", format!("{fit:.2} %"));
     }
@@ -547,20 +459,16 @@ fn facts(found: &Identification) -> Vec<(String, String)> {
     }
     let w = found.whiteness;
     let white = if w.white { "white" } else { "not white" };
+    let (statistic, lags, p) = (w.statistic, w.lags, w.p_value);
     add(
         "Residuals",
-        format!(
-            "{white}: Ljung-Box {:.1} over {} lags, p = {:.3}",
-            w.statistic, w.lags, w.p_value
-        ),
+        format!("{white}: Ljung-Box {statistic:.1} over {lags} lags, p = {p:.3}"),
     );
     for start in &found.starts {
+        let (from_s, to_s, loss) = (start.from_t_p_s, start.to_t_p_s, start.loss);
         add(
             "Start",
-            format!(
-                "t_p {:.3} s, ended at {:.4} s with loss {:.6e}",
-                start.from_t_p_s, start.to_t_p_s, start.loss
-            ),
+            format!("t_p {from_s:.3} s, ended at {to_s:.4} s with loss {loss:.6e}"),
         );
     }
     let losses: Vec<String> = found.loss_history.iter().map(|l| format!("{l:.6e}")).collect();
@@ -571,21 +479,18 @@ fn facts(found: &Identification) -> Vec<(String, String)> {
 
 /// Whether the residuals are free of the inputs.
 fn input_tests(found: &Identification) -> Table {
-    let row = |test: &haptic_analysis::identify::InputCorrelation| {
+    let row = |test: &InputCorrelation| {
         let verdict = if test.independent {
             "independent"
         } else {
             "correlated"
         };
-        vec![
-            Cell::text(test.input),
-            Cell::number(test.largest_z, 2),
-            Cell::text(verdict),
+        [
+            ("Input", Cell::text(test.input)),
+            ("Largest", Cell::number(test.largest_z, 2)),
+            ("Verdict", Cell::text(verdict)),
         ]
     };
-    Table::new(
-        "Residuals against each input of 0 to 1 s before, in standard deviations.",
-        ["Input", "Largest", "Verdict"],
-        found.input_correlation.iter().map(row),
-    )
+    let caption = "Residuals against each input of 0 to 1 s before, in standard deviations.";
+    Table::of_rows(caption, found.input_correlation.iter().map(row))
 }

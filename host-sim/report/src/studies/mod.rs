@@ -26,7 +26,10 @@ pub mod sweep;
 pub mod validation;
 
 use crate::document::WriteError;
-use crate::plot::{Mark, PlotError, Series};
+use crate::plot::{Mark, Marker, PlotError, Series};
+use haptic_batch::compare::Mean;
+use haptic_log::trace::Sample;
+use haptic_sim::scenario::Scenario;
 
 pub use crate::document::SeriesFormat;
 pub use files::write;
@@ -46,6 +49,27 @@ fn ended(line: Series, why: Option<&str>) -> impl Iterator<Item = Series> + use<
         .zip(last)
         .map(|(why, last)| Series::with_mark(why, line.style, Mark::Ends, vec![*last]));
     [line].into_iter().chain(cross)
+}
+
+/// Where on the road the failure comes.
+fn failure_marker(scenario: &Scenario, samples: &[Sample]) -> Option<Marker> {
+    let time_s = scenario.failure().at_s()?;
+    let sample = samples.iter().find(|sample| sample.time_s >= time_s)?;
+    Some(Marker::new("failure", sample.s_m))
+}
+
+/// A mean with half its interval; a dash if there is none.
+fn with_interval(value: Option<&Mean>) -> String {
+    value.map_or("\u{2013}".into(), |value| match value.interval_95 {
+        Some([low, high]) => format!("{:.3} \u{b1} {:.3}", value.mean, 0.5 * (high - low)),
+        None => format!("{:.3}", value.mean),
+    })
+}
+
+/// Roads with their speeds, as a sentence lists them.
+fn listed(places: &[(String, f64)]) -> String {
+    let name = |(road, kmh): &(String, f64)| format!("{road} at {kmh} km/h");
+    places.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
 /// Why the files of a study could not be made.

@@ -4,7 +4,7 @@ use haptic_analysis::identify::{Change, History, Parameter, Piece, Pieces};
 use haptic_batch::identify::IdentifiedDrive;
 
 use crate::document::{Cell, Table};
-use crate::plot::{Axis, Band, Figure, Panel, Series, Shade};
+use crate::plot::{Axis, Band, Figure, Series, Shade};
 
 /// What the figure shows.
 pub(super) const CAPTION: &str = "Each piece with its 95 % intervals, and the same drive followed by the Kalman filter. A band \
@@ -33,10 +33,9 @@ fn each(pieces: &[Piece]) -> Table {
         let mut cells = vec![Cell::number(piece.from_s, 1), Cell::number(piece.to_s, 1)];
         for name in SHOWN {
             let p = parameter(piece, name);
-            let number = |value| Cell::number(value, 4);
-            cells.push(number(p.and_then(|p| p.estimate)));
-            let [low, high] = p.and_then(|p| p.interval_95).map_or([None; 2], |i| i.map(Some));
-            cells.extend([number(low), number(high)]);
+
+            cells.push(Cell::number(p.and_then(|p| p.estimate), 4));
+            cells.extend(Cell::ends(p.and_then(|p| p.interval_95), 4));
         }
         let refuted = piece.identification.refuted.first();
         cells.push(Cell::Text(refuted.map_or_else(String::new, |r| r.cause.clone())));
@@ -60,11 +59,12 @@ fn changes(changes: &[Change]) -> Table {
             ("Changed", Cell::text(change.parameter)),
             ("by", Cell::number(change.by, 3)),
         ];
-        let names = ["Begin (s)", "End (s)"].into_iter().zip(change.at_s);
-        for ((name, at), [low, high]) in names.zip(change.at_95_s) {
-            cells.extend(
-                [(name, at), ("95 % from", low), ("to", high)].map(|(name, s)| (name, Cell::number(s, 1))),
-            );
+        for (name, (at, [low, high])) in ["Begin (s)", "End (s)"]
+            .into_iter()
+            .zip(change.at_s.into_iter().zip(change.at_95_s))
+        {
+            let times = [(name, at), ("95 % from", low), ("to", high)];
+            cells.extend(times.map(|(name, s)| (name, Cell::number(s, 1))));
         }
         cells.push(("Evidence", Cell::number(change.deviance, 1)));
         cells
@@ -97,36 +97,15 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
             ends.extend([interval, interval, [f64::NAN; 2]]);
             middles.extend([estimate, estimate, f64::NAN]);
         }
-        let followed = tracking
-            .time_s
-            .iter()
-            .copied()
-            .zip(history.estimate.iter().copied());
-        let points = x.iter().copied().zip(middles).collect();
-        Panel::new(
-            "",
-            Axis::new(name, unit),
-            vec![
-                Series::interval("95 % interval of a piece", 5, &x, &ends),
-                Series::line("followed", 4, followed.collect()),
-                Series::line("identified in a piece", 1, points),
-            ],
-        )
+        Axis::new(name, unit).panel([
+            Series::interval("95 % interval of a piece", 5, &x, &ends),
+            Series::through("followed", 4, &tracking.time_s, &history.estimate),
+            Series::through("identified in a piece", 1, &x, &middles),
+        ])
     };
-    let band = |change: &Change| {
-        let [from, to] = change.within_s();
-        Band {
-            label: "a change lies here (95 %)".into(),
-            from,
-            to,
-            shade: Shade::Dark,
-            panel: None,
-        }
-    };
+    let band = |change: &Change| Band::new("a change lies here (95 %)", change.within_s(), Shade::Dark);
     Some(Figure {
-        x: Axis::new("Time", "s"),
-        panels: histories.into_iter().map(panel).collect(),
         bands: pieces.changes.iter().map(band).collect(),
-        ..Figure::default()
+        ..Axis::new("Time", "s").figure(histories.map(panel))
     })
 }

@@ -4,7 +4,7 @@ mod hands;
 
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
-use haptic_batch::real_drives::{Found, Half, RealDrive, RealDrives};
+use haptic_batch::real_drives::{Found, Half, RealDrive, RealDrives, Source};
 
 /// Parameters that a torque record can carry.
 const PARAMETERS: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
@@ -12,36 +12,25 @@ const PARAMETERS: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
 /// The document of recordings.
 pub fn report(found: &RealDrives) -> Report {
     let hands = found.hands.as_ref().map(hands::section);
+    let caption = "Every half that was predicted, the best first: the variance of T_d that a driver, or a regression, fitted to the \
+                   other half of its drive accounts for. What is below -1 lies at -1: it is worse than that.";
+    let each = vec![
+        Block::figure("predictions", predictions(found), caption),
+        Block::Table(drives(found)),
+        Block::Table(refused(found)),
+    ];
     let sections = [
         ("Summary", summary(found)),
         ("Hands and override", hands.unwrap_or_default()),
-        (
-            "Drives",
-            vec![
-                Block::figure(
-                    "predictions",
-                    predictions(found),
-                    "Every half that was predicted, the best first: the variance of T_d that a driver, or a regression, fitted to the \
-                     other half of its drive accounts for. What is below -1 lies at -1: it is worse than that.",
-                ),
-                Block::Table(drives(found)),
-                Block::Table(refused(found)),
-            ],
-        ),
+        ("Drives", each),
         ("Sources", vec![Block::Table(sources(found))]),
     ];
-    Report {
-        title: format!("{} recordings of real people", files(found, |_| true)),
-        summary: "A driver is fitted to one half of each drive and judged on the other. VAF is the variance accounted for: 1 is \
-                  all, 0 is what the mean does."
-            .into(),
-        sections: sections
-            .into_iter()
-            .filter(|(_, blocks)| !blocks.is_empty())
-            .map(|(heading, blocks)| Section::new(heading, blocks))
-            .collect(),
-        ..Report::default()
-    }
+    let sections = sections.into_iter().filter(|(_, blocks)| !blocks.is_empty());
+    let sections = sections.map(|(heading, blocks)| Section::new(heading, blocks));
+    let title = format!("{} recordings of real people", files(found, |_| true));
+    let summary = "A driver is fitted to one half of each drive and judged on the other. VAF is the variance accounted for: 1 is \
+                   all, 0 is what the mean does.";
+    Report::new(title, summary, sections.collect())
 }
 
 fn judged(found: &RealDrives) -> impl Iterator<Item = (&RealDrive, &Found)> {
@@ -50,12 +39,8 @@ fn judged(found: &RealDrives) -> impl Iterator<Item = (&RealDrive, &Found)> {
 
 /// How many files have a part of this kind.
 fn files(found: &RealDrives, of: impl Fn(&RealDrive) -> bool) -> usize {
-    let mut names: Vec<&str> = found
-        .drives
-        .iter()
-        .filter(|d| of(d))
-        .map(|d| d.file.as_str())
-        .collect();
+    let drives = found.drives.iter().filter(|d| of(d));
+    let mut names: Vec<&str> = drives.map(|d| d.file.as_str()).collect();
     names.dedup();
     names.len()
 }
@@ -91,12 +76,9 @@ fn interval(mut values: Vec<f64>) -> Option<[f64; 2]> {
 
 fn with_interval(values: Vec<f64>) -> Cell {
     // A prediction that is ten times as far off as none is nonsense; its size says nothing more.
-    let text = |v: f64| {
-        if v < -10.0 {
-            "below -10".into()
-        } else {
-            format!("{v:.2}")
-        }
+    let text = |v: f64| match v < -10.0 {
+        true => "below -10".into(),
+        false => format!("{v:.2}"),
     };
     let within = interval(values.clone());
     let within = within.map(|[low, high]| format!(" ({} to {})", text(low), text(high)));
@@ -121,13 +103,13 @@ fn summary(found: &RealDrives) -> Vec<Block> {
         let wins = halves.iter().filter(|h| h.ours > h.linear).count();
         [
             ("Halves", Cell::text(name)),
-            ("Number", Cell::number(halves.len() as f64, 0)),
+            ("Number", Cell::count(halves.len())),
             ("Ours, fitted half", of(|h| h.own)),
             ("Ours, other half", of(|h| h.ours)),
             ("Two-point, other half", of(|h| h.two_point)),
             ("Linear, other half", of(|h| h.linear)),
             ("Ours less linear", of(|h| h.ours - h.linear)),
-            ("Ours is better in", Cell::number(wins as f64, 0)),
+            ("Ours is better in", Cell::count(wins)),
         ]
     };
     let models = Table::of_rows(
@@ -160,10 +142,8 @@ fn summary(found: &RealDrives) -> Vec<Block> {
             ("Share", Cell::number(identified / all, 2)),
         ]
     };
-    let shares = Table::of_rows(
-        "Driving time in which a parameter is identified. K_hg is asked of shared driving.",
-        PARAMETERS.map(share),
-    );
+    let caption = "Driving time in which a parameter is identified. K_hg is asked of shared driving.";
+    let shares = Table::of_rows(caption, PARAMETERS.map(share));
     let chance = judged(found).filter_map(|(_, f)| f.k_hg_p);
     let (beats, shifts) = chance.fold((0, 0), |(beats, n), p| (beats + usize::from(p <= 0.05), n + 1));
     let text = format!(
@@ -187,104 +167,68 @@ fn predictions(found: &RealDrives) -> Figure {
             let point = |(k, v): (usize, &f64)| (100.0 * (k as f64 + 0.5) / count, v.max(-1.0));
             Series::line(label, style, values.iter().enumerate().map(point).collect())
         };
-        Panel::new(
-            if by_hand { "by hand" } else { "shared" },
-            Axis {
-                limits: Some((-1.05, 1.0)),
-                ..Axis::new("variance accounted for", "-")
-            },
-            vec![
-                sorted("ours", 1, |h| h.ours),
-                sorted("two-point", 2, |h| h.two_point),
-                sorted("linear", 3, |h| h.linear),
-            ],
-        )
+        let series = [
+            sorted("ours", 1, |h| h.ours),
+            sorted("two-point", 2, |h| h.two_point),
+            sorted("linear", 3, |h| h.linear),
+        ];
+        let y = Axis::new("variance accounted for", "-").within(-1.05, 1.0);
+        Panel::new(if by_hand { "by hand" } else { "shared" }, y, series)
     };
     Figure {
-        x: Axis::new("halves, best first", "%"),
         same_y: true,
-        panels: [true, false].map(panel).into(),
-        ..Figure::default()
+        ..Axis::new("halves, best first", "%").figure([true, false].map(panel))
     }
 }
 
 fn drives(found: &RealDrives) -> Table {
     let row = |(drive, f): (&RealDrive, &Found)| {
         let k_hg = f.k_hg.as_ref().filter(|p| p.identified);
-        let interval = k_hg.and_then(|p| p.interval_95);
-        let mut cells = vec![
-            Cell::text(&drive.file),
-            Cell::text(part(drive)),
-            Cell::number(f.used_s, 1),
-        ];
-        for half in [0, 1] {
-            let half = f.halves.get(half);
-            cells.extend(
-                [half.map(|h| h.own), half.map(|h| h.ours), half.map(|h| h.linear)]
-                    .map(|v| Cell::number(v, 2)),
-            );
-        }
-        cells.push(Cell::number(f.residual_nm, 3));
-        cells.push(Cell::number(k_hg.and_then(|p| p.estimate), 2));
-        cells.extend([0, 1].map(|end| Cell::number(interval.map(|i| i[end]), 2)));
-        cells.push(Cell::number(f.k_hg_p, 2));
-        cells.push(Cell::text(f.identified.join(" ")));
-        cells.push(Cell::text(f.refuted.join("; ")));
-        cells
+        let [low, high] = Cell::ends(k_hg.and_then(|p| p.interval_95), 2);
+        let vaf = |half: usize, value: fn(&Half) -> f64| Cell::number(f.halves.get(half).map(value), 2);
+        [
+            ("Recording", Cell::text(&drive.file)),
+            ("Driving", Cell::text(part(drive))),
+            ("Used, s", Cell::number(f.used_s, 1)),
+            ("1: own", vaf(0, |h| h.own)),
+            ("other", vaf(0, |h| h.ours)),
+            ("linear", vaf(0, |h| h.linear)),
+            ("2: own", vaf(1, |h| h.own)),
+            ("other", vaf(1, |h| h.ours)),
+            ("linear", vaf(1, |h| h.linear)),
+            ("Residual, N.m", Cell::number(f.residual_nm, 3)),
+            ("K_hg", Cell::number(k_hg.and_then(|p| p.estimate), 2)),
+            ("95 % from", low),
+            ("to", high),
+            ("p", Cell::number(f.k_hg_p, 2)),
+            ("Identified", Cell::text(f.identified.join(" "))),
+            ("Refuted", Cell::text(f.refuted.join("; "))),
+        ]
     };
-    Table::new(
+    Table::of_rows(
         "VAF of our driver on the half that was fitted and on the other, and of the linear regression on the other: fitted to the \
          first half, then to the second. A K_hg is shown where it is identified; p is the share of circular shifts with as large a K_hg.",
-        [
-            "Recording",
-            "Driving",
-            "Used, s",
-            "1: own",
-            "other",
-            "linear",
-            "2: own",
-            "other",
-            "linear",
-            "Residual, N.m",
-            "K_hg",
-            "95 % from",
-            "to",
-            "p",
-            "Identified",
-            "Refuted",
-        ],
         judged(found).map(row),
     )
 }
 
 fn refused(found: &RealDrives) -> Table {
     let row = |drive: &RealDrive| {
-        let why = drive.refused.as_ref()?;
-        Some(vec![
-            Cell::text(&drive.file),
-            Cell::text(part(drive)),
-            Cell::text(why),
-        ])
+        let cells = [&drive.file, part(drive), drive.refused.as_ref()?].map(Cell::text);
+        Some(["Recording", "Driving", "Cause"].into_iter().zip(cells))
     };
-    Table::new(
-        "Refused.",
-        ["Recording", "Driving", "Cause"],
-        found.drives.iter().filter_map(row),
-    )
+    Table::of_rows("Refused.", found.drives.iter().filter_map(row))
 }
 
 fn sources(found: &RealDrives) -> Table {
-    let row = |s: &haptic_batch::real_drives::Source| {
+    let row = |s: &Source| {
         let commit = s.commit.as_deref().unwrap_or("none: untested");
-        [s.layout.as_str(), &s.source, commit, &s.licence]
-            .map(Cell::text)
-            .to_vec()
+        let cells = [&s.layout, &s.source, commit, &s.licence].map(Cell::text);
+        ["Layout", "Source", "Tried on commit", "Licence"]
+            .into_iter()
+            .zip(cells)
     };
-    Table::new(
-        "",
-        ["Layout", "Source", "Tried on commit", "Licence"],
-        found.sources.iter().map(row),
-    )
+    Table::of_rows("", found.sources.iter().map(row))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ const EXAMPLES: usize = 4;
 /// The ECU's estimate with two deviations on each side, and the truth: value from an abscissa on. `x` is the
 /// abscissa of a time, s.
 pub(super) fn panel(
-    title: String,
+    title: &str,
     readings: &[Reading],
     truth: &[(f64, f64)],
     x: impl Fn(f64) -> f64,
@@ -24,15 +24,12 @@ pub(super) fn panel(
         .map(|[k_hg, deviation]| [k_hg - 2.0 * deviation, k_hg + 2.0 * deviation])
         .collect();
     let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
-    Panel::new(
-        title,
-        Axis::new("K_hg", "-").within(-0.5, 1.5),
-        vec![
-            Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
-            Series::line("truth", 0, truth.to_vec()),
-            Series::line("estimate", 1, estimate.collect()),
-        ],
-    )
+    let series = [
+        Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
+        Series::line("truth", 0, truth.to_vec()),
+        Series::line("estimate", 1, estimate.collect()),
+    ];
+    Panel::new(title, Axis::new("K_hg", "-").within(-0.5, 1.5), series)
 }
 
 /// The errors of all participants together, by time.
@@ -40,7 +37,7 @@ fn pooled_table(results: &RelianceResults) -> Table {
     let row = |a: &Accuracy| {
         [
             ("Time (s)", Cell::number(a.after_s, 0)),
-            ("Estimates", Cell::number(a.count as f64, 0)),
+            ("Estimates", Cell::count(a.count)),
             ("Bias", Cell::number(a.bias, 4)),
             ("RMS error", Cell::number(a.rms, 4)),
             ("Deviation reported", Cell::number(a.deviation, 4)),
@@ -52,27 +49,24 @@ fn pooled_table(results: &RelianceResults) -> Table {
 
 /// The errors of each participant, by time.
 fn participants_table(results: &RelianceResults) -> Table {
-    let times = |what: &'static str| {
-        results
-            .pooled
-            .iter()
-            .map(move |a| format!("{what} after {} s", a.after_s))
-    };
     let row = |p: &ParticipantResult| {
-        let bias = p.accuracy.iter().map(|a| Cell::number(a.bias, 3));
-        let rms = p.accuracy.iter().map(|a| Cell::number(a.rms, 3));
-        let number = Cell::number(f64::from(p.participant), 0);
-        let head = [number, Cell::number(p.truth, 3), Cell::number(p.estimate, 3)];
-        head.into_iter().chain(bias).chain(rms).collect()
+        let name = |what: &str, a: &Accuracy| format!("{what} after {} s", a.after_s);
+        let bias = p
+            .accuracy
+            .iter()
+            .map(|a| (name("Bias", a), Cell::number(a.bias, 3)));
+        let rms = p
+            .accuracy
+            .iter()
+            .map(|a| (name("RMS", a), Cell::number(a.rms, 3)));
+        let head = [
+            ("Participant".into(), Cell::count(p.participant)),
+            ("True K_hg".into(), Cell::number(p.truth, 3)),
+            ("Estimate".into(), Cell::number(p.estimate, 3)),
+        ];
+        head.into_iter().chain(bias).chain(rms).collect::<Vec<_>>()
     };
-    let head = ["Participant", "True K_hg", "Estimate"]
-        .map(String::from)
-        .into_iter();
-    Table::new(
-        "Each participant",
-        head.chain(times("Bias")).chain(times("RMS")),
-        results.participants.iter().map(row),
-    )
+    Table::of_rows("Each participant", results.participants.iter().map(row))
 }
 
 /// How many estimates are near after a change, and what limited or ended the drives.
@@ -99,10 +93,8 @@ fn figure(results: &RelianceResults) -> Figure {
     let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
     let examples = results.examples.iter().step_by(stride);
     Figure {
-        x: Axis::new("Time", "s"),
         same_y: true,
-        panels: examples.map(example_panel).collect(),
-        ..Figure::default()
+        ..Axis::new("Time", "s").figure(examples.map(example_panel))
     }
 }
 
@@ -122,15 +114,11 @@ pub fn report(results: &RelianceResults) -> Report {
         Block::Table(pooled_table(results)),
         Block::Table(participants_table(results)),
     ];
-    Report {
-        title: "The driver's reliance, read live".into(),
-        summary,
-        sections: vec![
-            Section::new("A driver who changes", changing),
-            Section::new("A steady driver", steady),
-        ],
-        ..Report::default()
-    }
+    let sections = vec![
+        Section::new("A driver who changes", changing),
+        Section::new("A steady driver", steady),
+    ];
+    Report::new("The driver's reliance, read live", summary, sections)
 }
 
 fn example_panel(example: &Example) -> Panel {
@@ -138,5 +126,5 @@ fn example_panel(example: &Example) -> Panel {
     let end_s = example.readings.last().map_or(time_s, |r| r.time_s);
     let truth = [(0.0, before), (time_s, before), (time_s, after), (end_s, after)];
     let title = format!("Participant {}", example.participant);
-    panel(title, &example.readings, &truth, |time_s| time_s)
+    panel(&title, &example.readings, &truth, |time_s| time_s)
 }

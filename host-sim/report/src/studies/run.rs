@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::reliance::panel as reliance_panel;
-use super::{LEFT_THE_ROAD, curves, ended};
+use super::{LEFT_THE_ROAD, curves, ended, failure_marker};
 use crate::document::{
     Block, Cell, Provenance, Report, Section, SeriesFormat, Table, WriteError, definitions_table, write_file,
     write_trace,
 };
-use crate::plot::{Axis, Figure, Marker, Panel, Series};
+use crate::plot::{Axis, Figure, Series};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::trace::Sample;
@@ -56,14 +56,11 @@ fn table(results: &SingleResults) -> Table {
     let mut rows: Vec<_> = DEFINITIONS.iter().map(metric).collect();
     if let Some(read) = results.k_hg {
         let name = Cell::text("K_hg, as the ECU reads it");
-        rows.push(vec![
-            name,
-            Cell::number(read.k_hg, 4),
-            Cell::Text(format!(
-                "+- {:.4}: {:.4} of noise, {:.4} for an arm with a t_nms of {} to {} s",
-                read.deviation, read.noise, read.arm, read.t_nms_s[0], read.t_nms_s[1]
-            )),
-        ]);
+        let spread = format!(
+            "+- {:.4}: {:.4} of noise, {:.4} for an arm with a t_nms of {} to {} s",
+            read.deviation, read.noise, read.arm, read.t_nms_s[0], read.t_nms_s[1]
+        );
+        rows.push(vec![name, Cell::number(read.k_hg, 4), Cell::Text(spread)]);
     }
     Table::new("", ["Metric", "Value", "Unit"], rows)
 }
@@ -73,17 +70,9 @@ fn figure(single: &SingleRun) -> Figure {
     let diverged = single.run.diverged().then_some(LEFT_THE_ROAD);
     let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| {
         let points = samples.iter().map(|s| (s.s_m, value(s))).collect();
-        Panel::new(
-            "",
-            Axis::new(quantity, unit),
-            ended(Series::line("", 1, points), diverged).collect(),
-        )
+        Axis::new(quantity, unit).panel(ended(Series::line("", 1, points), diverged))
     };
-    let failed = single
-        .scenario
-        .failure()
-        .at_s()
-        .and_then(|t| samples.iter().find(|s| s.time_s >= t));
+
     // Each torque for itself: the probe would hide the driver's.
     let mut panels = vec![
         panel("Lateral error", "m", |s| s.lateral_error_m),
@@ -99,32 +88,18 @@ fn figure(single: &SingleRun) -> Figure {
             let next = samples.partition_point(|s| s.time_s < time_s);
             samples.get(next).or(samples.last()).map_or(0.0, |s| s.s_m)
         };
-        let truth: Vec<_> = true_reliance(single)
-            .into_iter()
-            .map(|(t, k_hg)| (place(t), k_hg))
-            .collect();
-        panels.push(reliance_panel(
-            String::new(),
-            &single.readings.readings,
-            &truth,
-            place,
-        ));
+        let truth = true_reliance(single).into_iter();
+        let truth: Vec<_> = truth.map(|(t, k_hg)| (place(t), k_hg)).collect();
+        panels.push(reliance_panel("", &single.readings.readings, &truth, place));
     }
+    let bands = curves::bands(single.scenario.course());
     Figure {
-        x: Axis::new("Distance along the road", "m"),
-        panels,
-        markers: failed
-            .map(|s| Marker {
-                label: "failure".into(),
-                x: s.s_m,
-            })
-            .into_iter()
-            .collect(),
-        bands: curves::bands(single.scenario.course())
+        markers: failure_marker(&single.scenario, samples).into_iter().collect(),
+        bands: bands
             .into_iter()
             .chain(curves::unguided(&single.unguided))
             .collect(),
-        ..Figure::default()
+        ..Axis::new("Distance along the road", "m").figure(panels)
     }
 }
 
@@ -152,52 +127,47 @@ pub fn report(single: &SingleRun) -> Report {
     } else {
         "Lateral error, wheel angle and torques."
     };
-    Report {
-        title: "A run under shared steering control".into(),
-        summary: format!(
-            "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}), failure {}: {}. Metrics are taken over {from} to {to} m of \
+    let summary = format!(
+        "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}), failure {}: {}. Metrics are taken over {from} to {to} m of \
              {:.0} m.",
-            results.course,
-            scenario.speed(),
-            scenario.driver().t_p,
-            scenario.gains().k_d,
-            scenario.gains().k_hg,
-            scenario.condition(),
-            results.record.failure,
-            how_it_ended(single),
-            results.course_length_m,
-        ),
+        results.course,
+        scenario.speed(),
+        scenario.driver().t_p,
+        scenario.gains().k_d,
+        scenario.gains().k_hg,
+        scenario.condition(),
+        results.record.failure,
+        how_it_ended(single),
+        results.course_length_m,
+    );
+    let along = vec![
+        Block::figure("run", figure(single), caption),
+        Block::Events(events(single)),
+    ];
+    let metrics = vec![
+        Block::Table(table(results)),
+        Block::Table(definitions_table()).on_page(),
+    ];
+    let sections = vec![
+        Section::new("Along the road", along),
+        Section::new("Metrics", metrics),
+    ];
+    Report {
         notes: results.notes.clone(),
-        sections: vec![
-            Section::new(
-                "Along the road",
-                vec![
-                    Block::figure("run", figure(single), caption),
-                    Block::Events(events(single)),
-                ],
-            ),
-            Section::new(
-                "Metrics",
-                vec![
-                    Block::Table(table(results)),
-                    Block::Table(definitions_table()).on_page(),
-                ],
-            ),
-        ],
         // Enough to repeat the run.
         provenance: Provenance::new(Some(scenario.to_toml())),
+        ..Report::new("A run under shared steering control", summary, sections)
     }
 }
 
 fn events(single: &SingleRun) -> Vec<Event> {
     let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
     let mut events = single.reported.clone();
+    let event = |time_s, what| Event { time_s, what };
     events.extend(single.unguided.iter().flat_map(|stretch| {
-        let event = |time_s, what| Event { time_s, what };
         let left = event(stretch.from_s, format!("The guidance leaves: {}", stretch.why));
-        let back = stretch
-            .until_s
-            .map(|back_s| event(back_s, "The guidance is back".into()));
+        let back = stretch.until_s;
+        let back = back.map(|back_s| event(back_s, "The guidance is back".into()));
         std::iter::once(left).chain(back)
     }));
     if let Some(time_s) = single.scenario.failure().at_s().filter(|t| *t <= end_s) {
@@ -205,23 +175,17 @@ fn events(single: &SingleRun) -> Vec<Event> {
             FailureKind::Input => "The lane preview stops",
             FailureKind::Torque | FailureKind::None => "The guidance torque drops to zero",
         };
-        events.push(Event {
-            time_s,
-            what: what.into(),
-        });
+        events.push(event(time_s, what.into()));
         let noticed_s = time_s + FAILURE_REACTION_S;
         if noticed_s <= end_s {
-            events.push(Event {
-                time_s: noticed_s,
-                what: "The driver steers as manually".into(),
-            });
+            events.push(event(noticed_s, "The driver steers as manually".into()));
         }
     }
     let what = match single.run.ending {
         Ending::CourseEnd => "The far point reaches the end of the course".into(),
         Ending::Diverged { s_m } => format!("The run diverged at {s_m:.0} m and was stopped"),
     };
-    events.push(Event { time_s: end_s, what });
+    events.push(event(end_s, what));
     events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     events
 }

@@ -33,12 +33,8 @@ pub fn report(map: &Map) -> Report {
         Block::Table(shares(map)),
         Block::Text(judgement(map)),
     ];
-    Report {
-        title: "Who keeps the lane, how fast, with which delay".into(),
-        summary: SUMMARY.into(),
-        sections: vec![Section::new("Speed and delay", blocks)],
-        ..Report::default()
-    }
+    let title = "Who keeps the lane, how fast, with which delay";
+    Report::new(title, SUMMARY, vec![Section::new("Speed and delay", blocks)])
 }
 
 /// Whether guidance keeps every driver stable who is stable alone.
@@ -63,18 +59,14 @@ fn judgement(map: &Map) -> String {
             broken.join("; ")
         )
     };
+    let named =
+        |place: &Place, condition| format!("{} km/h, t_p {} s, {condition}", place.speed_kmh, place.t_p);
     let guided = map.places.iter().flat_map(|place| {
         let guided = place
             .drives
             .iter()
             .filter(|drive| drive.condition != Condition::Manual);
-        guided.map(move |drive| {
-            let name = format!(
-                "{} km/h, t_p {} s, {}",
-                place.speed_kmh, place.t_p, drive.condition
-            );
-            (&drive.away, name)
-        })
+        guided.map(move |drive| (&drive.away, named(place, drive.condition)))
     });
     if let Some(left) = left_by_themselves(guided) {
         text.push_str(&format!(" The peaks are not all of guided driving: {left}."));
@@ -189,30 +181,20 @@ type Shown = (&'static str, usize, f64, String);
 /// A map for each way to drive, on the same axes.
 fn figure(map: &Map, show: fn(&Place, &Drive) -> Shown) -> Figure {
     let size = [SPEEDS_KMH[1] - SPEEDS_KMH[0], DELAYS_S[1] - DELAYS_S[0]];
-    let around = |axis: Axis, all: &[f64], size: f64| {
-        axis.within(all[0] - 0.5 * size, all[all.len() - 1] + 0.5 * size)
-    };
+
     // A legend names each kind once.
     let series = |(place, drive): (&Place, &Drive)| {
         let (label, style, strength, word) = show(place, drive);
         let shown = vec![(0.15 + 0.6 * strength.min(1.0), word)];
-        Series::with_mark(
-            label,
-            style,
-            Mark::Fields { size, shown },
-            vec![(place.speed_kmh, place.t_p)],
-        )
+        let points = vec![(place.speed_kmh, place.t_p)];
+        Series::with_mark(label, style, Mark::Fields { size, shown }, points)
     };
-    let panel = |condition: Condition| Panel {
-        title: name(condition),
-        y: around(Axis::new("t_p", "s"), &DELAYS_S, size[1]),
-        series: in_condition(map, condition).map(series).collect(),
+    let panel = |condition: Condition| {
+        let y = Axis::new("t_p", "s").around(&DELAYS_S);
+        Panel::new(name(condition), y, in_condition(map, condition).map(series))
     };
-    Figure {
-        x: around(Axis::new("Speed", "km/h"), &SPEEDS_KMH, size[0]),
-        panels: Condition::ALL.map(panel).to_vec(),
-        ..Figure::default()
-    }
+    let x = Axis::new("Speed", "km/h").around(&SPEEDS_KMH);
+    x.figure(Condition::ALL.map(panel))
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@ use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_fil
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::Away;
 use haptic_batch::study::{
-    Difference, Recorded, Session, SessionResult, StudyResults, Subject, of_participants,
+    Difference, Recorded, Session, SessionResult, Source, StudyResults, Subject, of_participants,
 };
+use haptic_log::table::TableWriter;
 
 /// The document of a study.
 pub fn report(results: &StudyResults) -> Report {
@@ -21,18 +22,15 @@ pub fn report(results: &StudyResults) -> Report {
             session.name()
         )));
     }
+    let differences = vec![Block::Table(differences(results))];
+    let sections = vec![
+        Section::new("Sessions", each),
+        Section::new("By condition", vec![Block::Table(by_condition(results))]),
+        Section::new("Differences between conditions", differences),
+    ];
     Report {
-        title: results.study.clone(),
         notes: results.notes.clone(),
-        sections: vec![
-            Section::new("Sessions", each),
-            Section::new("By condition", vec![Block::Table(by_condition(results))]),
-            Section::new(
-                "Differences between conditions",
-                vec![Block::Table(differences(results))],
-            ),
-        ],
-        ..Report::default()
+        ..Report::new(&results.study, "", sections)
     }
 }
 
@@ -42,53 +40,42 @@ pub fn report(results: &StudyResults) -> Report {
 /// What could not be written.
 pub fn write_tables(results: &StudyResults, directory: &Path) -> Result<(), WriteError> {
     write_file(&directory.join("sessions.csv"), |file| {
-        let metrics: Vec<&str> = DEFINITIONS.iter().map(|d| d.name).collect();
-        let (away, metrics) = (Away::NAMES.join(","), metrics.join(","));
-        writeln!(
-            file,
-            "participant,position,condition,repetition,who,seed,source,version,diverged,end_m,{away},{metrics}"
-        )?;
+        let names = "participant,position,condition,repetition,who,seed,source,version,diverged,end_m";
+        let metrics = DEFINITIONS.iter().map(|d| d.name);
+        let names = names.split(',').chain(Away::NAMES).chain(metrics);
+        let mut table = TableWriter::new(file, names)?;
         for session in &results.sessions {
-            let Some(recorded) = &session.recorded else {
-                continue;
-            };
-            writeln!(file, "{}", row(session, recorded))?;
+            if let Some(recorded) = &session.recorded {
+                table.row(row(session, recorded))?;
+            }
         }
-        Ok(())
+        table.finish()
     })?;
     write_file(&directory.join("differences.csv"), |file| {
-        writeln!(
-            file,
-            "from,to,metric,unit,participants,mean,from_95,to_95,effect_size_dz"
-        )?;
+        let names = "from,to,metric,unit,participants,mean,from_95,to_95,effect_size_dz";
+        let mut table = TableWriter::new(file, names.split(','))?;
         for d in &results.differences {
+            let words = [&d.from, &d.to, d.metric, d.unit].map(String::from);
             let [low, high] = d.interval_95.map_or([None; 2], |ends| ends.map(Some));
-            let [low, high, effect] =
-                [low, high, d.effect_size].map(|x| x.map_or(String::new(), |x| x.to_string()));
-            let Difference {
-                from,
-                to,
-                metric,
-                unit,
-                participants,
-                mean,
-                ..
-            } = d;
-            writeln!(
-                file,
-                "{from},{to},{metric},{unit},{participants},{mean},{low},{high},{effect}"
+            let numbers = [Some(d.mean), low, high, d.effect_size];
+            let numbers = numbers.map(|x| x.map_or(String::new(), |x| x.to_string()));
+            table.row(
+                words
+                    .into_iter()
+                    .chain([d.participants.to_string()])
+                    .chain(numbers),
             )?;
         }
-        Ok(())
+        table.finish()
     })
 }
 
 /// A session as a line of the table. Names hold no commas.
-fn row(session: &SessionResult, recorded: &Recorded) -> String {
+fn row(session: &SessionResult, recorded: &Recorded) -> Vec<String> {
     let record = &recorded.record;
     let source = match recorded.source {
-        haptic_batch::study::Source::Simulated => "simulated",
-        haptic_batch::study::Source::Imported => "imported",
+        Source::Simulated => "simulated",
+        Source::Imported => "imported",
     };
     let mut fields = vec![
         session.participant.clone(),
@@ -105,7 +92,7 @@ fn row(session: &SessionResult, recorded: &Recorded) -> String {
     fields.extend(record.away.texts());
     let metric = |d: &Definition| (d.value)(&record.metrics).map_or(String::new(), |value| value.to_string());
     fields.extend(DEFINITIONS.iter().map(metric));
-    fields.join(",")
+    fields
 }
 
 fn who(who: Subject) -> &'static str {
@@ -115,18 +102,14 @@ fn who(who: Subject) -> &'static str {
     }
 }
 
-fn text(text: impl Into<String>) -> Cell {
-    Cell::text(text)
-}
-
 /// Who drives what, in which order: a row for each participant.
 pub fn plan(sessions: &[Session]) -> Table {
     let places = sessions.iter().map(|s| s.position).max().unwrap_or(0);
     let mut columns = vec!["Participant".to_owned(), "Who".to_owned()];
     columns.extend((1..=places).map(|place| place.to_string()));
     let rows = sessions.chunks(places.max(1)).map(|of_one| {
-        let mut row = vec![text(&of_one[0].participant), text(who(of_one[0].who))];
-        row.extend(of_one.iter().map(|session| text(&session.condition)));
+        let mut row = vec![Cell::text(&of_one[0].participant), Cell::text(who(of_one[0].who))];
+        row.extend(of_one.iter().map(|session| Cell::text(&session.condition)));
         row
     });
     Table::new("", columns, rows)
@@ -138,10 +121,8 @@ fn sessions(results: &StudyResults) -> Table {
         let recorded = session.recorded.as_ref();
         let metric = |name: &str| {
             let found = DEFINITIONS.iter().find(|d| d.name == name);
-            let value = recorded
-                .zip(found)
-                .and_then(|(r, d)| (d.value)(&r.record.metrics));
-            Cell::number(value, 3)
+            let value = recorded.zip(found);
+            Cell::number(value.and_then(|(r, d)| (d.value)(&r.record.metrics)), 3)
         };
         let left = recorded.map(|r| r.record.away).filter(Away::is_by_itself);
         let state = match (recorded, session.who) {
@@ -153,10 +134,10 @@ fn sessions(results: &StudyResults) -> Table {
             (None, Subject::Simulated) => "not driven".to_owned(),
         };
         [
-            ("Participant", text(&session.participant)),
-            ("Place", text(session.position.to_string())),
-            ("Condition", text(&session.condition)),
-            ("State", text(state)),
+            ("Participant", Cell::text(&session.participant)),
+            ("Place", Cell::text(session.position.to_string())),
+            ("Condition", Cell::text(&session.condition)),
+            ("State", Cell::text(state)),
             ("Peak lateral error (m)", metric("peak_lateral_error_m")),
             ("RMS driver torque (N.m)", metric("rms_driver_torque_nm")),
         ]
@@ -176,16 +157,16 @@ const SHOWN: [&str; 4] = [
 fn differences(results: &StudyResults) -> Table {
     let row = |d: &Difference| {
         let label = DEFINITIONS.iter().find(|own| own.name == d.metric);
-        let number = |value: Option<f64>, decimals| Cell::number(value, decimals);
+        let [low, high] = Cell::ends(d.interval_95, 4);
         [
-            ("Conditions", text(format!("{} - {}", d.to, d.from))),
-            ("Metric", text(label.map_or(d.metric, |own| own.label))),
-            ("Unit", text(d.unit)),
-            ("Difference", number(Some(d.mean), 4)),
-            ("95 % from", number(d.interval_95.map(|ends| ends[0]), 4)),
-            ("to", number(d.interval_95.map(|ends| ends[1]), 4)),
-            ("d_z", number(d.effect_size, 2)),
-            ("n", Cell::number(d.participants as f64, 0)),
+            ("Conditions", Cell::text(format!("{} - {}", d.to, d.from))),
+            ("Metric", Cell::text(label.map_or(d.metric, |own| own.label))),
+            ("Unit", Cell::text(d.unit)),
+            ("Difference", Cell::number(d.mean, 4)),
+            ("95 % from", low),
+            ("to", high),
+            ("d_z", Cell::number(d.effect_size, 2)),
+            ("n", Cell::count(d.participants)),
         ]
     };
     let shown = results.differences.iter().filter(|d| SHOWN.contains(&d.metric));
@@ -204,7 +185,7 @@ fn by_condition(results: &StudyResults) -> Table {
         columns.extend([condition.clone(), "SD".into(), "n".into()]);
     }
     let row = |d: &Definition| {
-        let mut cells = vec![text(d.label), text(d.unit)];
+        let mut cells = vec![Cell::text(d.label), Cell::text(d.unit)];
         for condition in &results.conditions {
             let each = of_participants(&results.sessions, condition, d);
             let values: Vec<f64> = each.into_iter().flatten().collect();

@@ -40,41 +40,40 @@ impl Validation {
 
     /// What it rests on, and what came out, in a sentence or two.
     fn summary(&self) -> String {
-        let rests_on = |drives: u32, plan: &ExperimentPlan| {
-            let numbers: Vec<String> = plan.participants.iter().map(u32::to_string).collect();
-            let (probe_nm, seed) = (plan.probe_nm, plan.seed);
+        let rests_on = |drives: u32, participants: &[u32], (probe_nm, seed): (f64, u64)| {
+            let numbers: Vec<String> = participants.iter().map(u32::to_string).collect();
             format!(
                 "Guided drives of each participant: {drives}, of participants {}; probe {probe_nm} N.m, seeds from {seed}",
                 numbers.join(", ")
             )
+        };
+        let of_plan = |drives: u32, plan: &ExperimentPlan| {
+            rests_on(drives, &plan.participants, (plan.probe_nm, plan.seed))
         };
         match self {
             Self::Coverage(r) => {
                 let mut participants: Vec<u32> =
                     r.participants.iter().filter_map(|p| p.participant).collect();
                 participants.dedup();
-                let (probe_nm, seed) = (r.probe_nm, r.seed);
-                let plan = ExperimentPlan {
-                    participants,
-                    probe_nm,
-                    seed,
-                };
-                format!("{}.", rests_on(r.repetitions, &plan))
+                format!(
+                    "{}.",
+                    rests_on(r.repetitions, &participants, (r.probe_nm, r.seed))
+                )
             }
             Self::Corruptions(r) => format!(
                 "{}. {} of {} identified values are false. Information bound of gain_1, gain_2, gain_3, t_p, K_hg on clean \
                  logs: {}.",
-                rests_on(r.seeds, &r.plan),
+                of_plan(r.seeds, &r.plan),
                 r.false_identifications,
                 r.identified,
                 r.bound.map(|b| format!("{b:.4}")).join(", ")
             ),
-            Self::Changes(r) => format!("{}. {}", rests_on(r.drives, &r.plan), changes::summary(r)),
-            Self::Methods(r) => format!("{}.", rests_on(r.seeds, &r.plan)),
+            Self::Changes(r) => format!("{}. {}", of_plan(r.drives, &r.plan), changes::summary(r)),
+            Self::Methods(r) => format!("{}.", of_plan(r.seeds, &r.plan)),
             Self::Recordings(r) => format!(
                 "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
                  between it and the hands; each lane line has noise of 2 cm where nothing else is said.",
-                rests_on(r.seeds, &r.plan),
+                of_plan(r.seeds, &r.plan),
                 r.false_identifications,
                 r.identified,
             ),
@@ -131,13 +130,9 @@ impl Validation {
         let broken = broken.map(|line| Block::Text(format!("Not kept: {line}.")).on_page());
         let figure = Block::figure(name, self.figure(), caption);
         let tables = self.tables().into_iter().map(Block::Table);
-        let blocks = broken.chain([figure]).chain(tables);
-        Report {
-            title: title.into(),
-            summary: self.summary(),
-            sections: vec![Section::new("Truth and estimate", blocks.collect())],
-            ..Report::default()
-        }
+        let blocks = broken.chain([figure]).chain(tables).collect();
+        let sections = vec![Section::new("Truth and estimate", blocks)];
+        Report::new(title, self.summary(), sections)
     }
 
     fn figure(&self) -> Figure {
@@ -169,41 +164,24 @@ fn coverage_figure(result: &Repetitions) -> Figure {
     let mut series = wanted.to_vec();
     series.push(dots("each participant", 2, ASIDE, &result.participants));
     series.push(dots("all participants", 1, -ASIDE, &result.pooled));
-    Figure {
-        panels: vec![Panel {
-            title: String::new(),
-            y: Axis::new("95 % intervals that hold the truth", "%"),
-            series,
-        }],
-        rows: rows.into_iter().map(String::from).collect(),
-        ..Figure::default()
-    }
+    let panel = Axis::new("95 % intervals that hold the truth", "%").panel(series);
+    Figure::of_rows(rows, [panel])
 }
 
 fn corruptions_figure(result: &Corruptions) -> Figure {
-    let panel = |label: &str, share: fn(&CorruptionLine) -> Option<f64>| {
+    let panel = |what: &str, share: fn(&CorruptionLine) -> Option<f64>| {
         let lines = result.lines.iter().enumerate();
         let points = lines.filter_map(|(row, line)| Some((place(row), 100.0 * share(line)?)));
-        Panel {
-            title: String::new(),
-            y: Axis {
-                label: label.into(),
-                limits: Some((-2.0, 102.0)),
-                ..Axis::default()
-            },
-            series: vec![Series::dots("", 1, points.collect())],
-        }
+        let y = Axis::new(what, "%").within(-2.0, 102.0);
+        y.panel([Series::dots("", 1, points.collect())])
     };
-    Figure {
-        rows: result.lines.iter().map(|l| l.corrupted_by.into()).collect(),
-        panels: vec![
-            panel("Values identified (%)", |l| {
-                Some(l.identified as f64 / (l.intervals.len() * l.drives).max(1) as f64)
-            }),
-            panel("Their 95 % intervals that hold (%)", |l| l.coverage),
-        ],
-        ..Figure::default()
-    }
+    let identified =
+        |l: &CorruptionLine| Some(l.identified as f64 / (l.intervals.len() * l.drives).max(1) as f64);
+    let panels = [
+        panel("Values identified", identified),
+        panel("Their 95 % intervals that hold", |l| l.coverage),
+    ];
+    Figure::of_rows(result.lines.iter().map(|l| l.corrupted_by), panels)
 }
 
 /// Most that the figure shows of an error, in information bounds.
@@ -219,60 +197,43 @@ fn methods_figure(lines: &[MethodLine]) -> Figure {
         let points = errors.map(|(row, (rms, bound))| (place(row) + aside, rms / bound));
         Series::dots(line.method, style + 1, points.collect())
     };
-    let panel = |noise: &&str| Panel {
-        title: noise.trim_start_matches("lane noise ").into(),
-        y: Axis {
-            label: "RMS error / bound (-)".into(),
-            limits: Some((0.0, SHOWN)),
-            ..Axis::default()
-        },
-        series: lines.iter().filter(|l| l.noise == *noise).map(series).collect(),
+    let panel = |noise: &&str| {
+        let of_noise = lines.iter().filter(|l| l.noise == *noise);
+        let y = Axis::new("RMS error / bound", "-").within(0.0, SHOWN);
+        Panel::new(noise.trim_start_matches("lane noise "), y, of_noise.map(series))
     };
-    Figure {
-        rows: ["gain_1", "gain_2", "gain_3", "t_p", "K_hg"]
-            .map(String::from)
-            .to_vec(),
-        panels: noises.iter().map(panel).collect(),
-        ..Figure::default()
-    }
+    Figure::of_rows(PARAMETERS, noises.iter().map(panel))
+}
+
+/// Names of the values, in their order.
+const PARAMETERS: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "K_hg"];
+
+/// A column of errors for each parameter.
+fn of_parameters(errors: &[f64; 5]) -> impl Iterator<Item = (&'static str, Cell)> {
+    let names = ["RMS gain_1"].into_iter().chain(PARAMETERS.into_iter().skip(1));
+    names.zip(errors.map(|x| Cell::number(x, 4)))
 }
 
 /// What was made of each corruption.
 fn corruptions_table(result: &Corruptions) -> Table {
     let row = |l: &CorruptionLine| {
-        let count = |n: usize| Cell::number(n as f64, 0);
         let mut cells = vec![
-            Cell::text(l.corrupted_by),
-            count(l.drives),
-            count(l.refuted),
-            count(l.identified),
-            count(l.false_identifications),
-            Cell::number(l.coverage, 3),
+            ("Corrupted by", Cell::text(l.corrupted_by)),
+            ("Drives", Cell::count(l.drives)),
+            ("Refuted", Cell::count(l.refuted)),
+            ("Identified", Cell::count(l.identified)),
+            ("False", Cell::count(l.false_identifications)),
+            ("Coverage of 95 %", Cell::number(l.coverage, 3)),
         ];
-        cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
-        cells.push(count(l.k_hg_read));
+        cells.extend(of_parameters(&l.rms));
         let cause = l.cause.as_ref().map(|(cause, n)| format!("{n}: {cause}"));
-        cells.push(Cell::Text(cause.unwrap_or_default()));
+        cells.push(("K_hg read", Cell::count(l.k_hg_read)));
+        cells.push(("Cause named most", Cell::Text(cause.unwrap_or_default())));
         cells
     };
-    Table::new(
+    Table::of_rows(
         "False: called identified, and more than 4 standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. RMS \
-                  errors are those of all drives, refuted or not.",
-        [
-            "Corrupted by",
-            "Drives",
-            "Refuted",
-            "Identified",
-            "False",
-            "Coverage of 95 %",
-            "RMS gain_1",
-            "gain_2",
-            "gain_3",
-            "t_p",
-            "K_hg",
-            "K_hg read",
-            "Cause named most",
-        ],
+         errors are those of all drives, refuted or not.",
         result.lines.iter().map(row),
     )
 }
@@ -283,20 +244,22 @@ fn held_table(result: &Corruptions) -> Table {
         let all = held.iter().fold(Held::default(), |sum, &h| sum + h);
         let cell = |h: Held| {
             let text = h.share().map(|x| format!("{x:.3} of {}", h.identified));
-            Cell::Text(text.unwrap_or_else(|| "-".into()))
+            Cell::Text(text.unwrap_or("-".into()))
         };
         let cells = held.iter().copied().chain([all]).map(cell);
-        std::iter::once(Cell::text(name)).chain(cells).collect()
+        let named = PARAMETERS.into_iter().chain(["All"]).zip(cells);
+        let head = std::iter::once(("Corrupted by", Cell::text(name)));
+        head.chain(named).collect::<Vec<_>>()
     };
     let lines = result.lines.iter().filter(|l| l.identified > 0);
-    let mut rows: Vec<Vec<Cell>> = lines.map(|l| row(l.corrupted_by, &l.intervals)).collect();
-    rows.push(row("all, t_nms as assumed", &result.intervals_at_t_nms));
-    rows.push(row("all", &result.intervals));
-    Table::new(
+    let all = [
+        row("all, t_nms as assumed", &result.intervals_at_t_nms),
+        row("all", &result.intervals),
+    ];
+    Table::of_rows(
         "Share of the 95 % intervals of identified values that hold the truth. Corruptions with which nothing is identified are \
-                  left out.",
-        ["Corrupted by", "gain_1", "gain_2", "gain_3", "t_p", "K_hg", "All"],
-        rows,
+         left out.",
+        lines.map(|l| row(l.corrupted_by, &l.intervals)).chain(all),
     )
 }
 
@@ -309,51 +272,42 @@ fn off_coverage(result: &Repetitions) -> Vec<String> {
         .pooled
         .iter()
         .filter(|p| !KEPT.contains(&p.coverage_at_t_nms));
-    off.map(|p| {
-        format!(
-            "{}: the 95 % intervals hold the truth in {:.1} % of the drives, 93 to 97 are wanted",
-            p.parameter,
-            100.0 * p.coverage_at_t_nms
-        )
-    })
-    .collect()
+    let told = off.map(|p| {
+        let (name, held) = (p.parameter, 100.0 * p.coverage_at_t_nms);
+        format!("{name}: the 95 % intervals hold the truth in {held:.1} % of the drives, 93 to 97 are wanted")
+    });
+    told.collect()
 }
 
 /// What each way to treat camera noise is worth.
 fn methods_table(lines: &[MethodLine]) -> Table {
-    let row = |l: &MethodLine| {
-        let mut cells = vec![
-            Cell::text(l.noise),
-            Cell::text(l.method),
-            Cell::number(l.drives as f64, 0),
+    let cells = |noise, method, drives, errors: &[f64; 5], coverage| {
+        let head = [
+            ("Noise", Cell::text(noise)),
+            ("Method", Cell::text(method)),
+            ("Drives", drives),
         ];
-        cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
-        cells.push(Cell::number(l.coverage, 3));
-        cells
+        let cells = head
+            .into_iter()
+            .chain(of_parameters(errors))
+            .chain([("Coverage", coverage)]);
+        cells.collect::<Vec<_>>()
     };
-    let bound = lines.first().map(|l| {
-        let mut cells = vec![
-            Cell::text("none"),
-            Cell::text("information bound"),
-            Cell::text("-"),
-        ];
-        cells.extend(l.bound.iter().map(|&x| Cell::number(x, 4)));
-        cells.push(Cell::text("-"));
-        cells
-    });
-    Table::new(
+    let row = |l: &MethodLine| {
+        cells(
+            l.noise,
+            l.method,
+            Cell::count(l.drives),
+            &l.rms,
+            Cell::number(l.coverage, 3),
+        )
+    };
+    let nothing = || Cell::text("-");
+    let bound = lines
+        .first()
+        .map(|l| cells("none", "information bound", nothing(), &l.bound, nothing()));
+    Table::of_rows(
         "RMS errors by noise on the lane signals and way to treat it, and the share of 95 % intervals that hold.",
-        [
-            "Noise",
-            "Method",
-            "Drives",
-            "RMS gain_1",
-            "gain_2",
-            "gain_3",
-            "t_p",
-            "K_hg",
-            "Coverage",
-        ],
         lines.iter().map(row).chain(bound),
     )
 }
@@ -361,22 +315,19 @@ fn methods_table(lines: &[MethodLine]) -> Table {
 /// Estimates of repeated drives against the truth.
 fn repetitions_table(result: &Repetitions) -> Table {
     let row = |line: &Repeated| {
-        let number = |value, decimals| Cell::number(value, decimals);
+        let participant = line.participant.map_or("all".into(), |n| n.to_string());
         [
-            (
-                "Participant",
-                Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
-            ),
+            ("Participant", Cell::Text(participant)),
             ("Parameter", Cell::text(line.parameter)),
-            ("Drives", Cell::number(line.drives as f64, 0)),
-            ("Identified", number(Some(line.identified), 3)),
-            ("Coverage of 95 %", number(Some(line.coverage), 3)),
-            ("same, t_nms known", number(Some(line.coverage_at_t_nms), 3)),
-            ("Bias", number(line.bias, 4)),
-            ("RMS error", number(line.rms, 4)),
-            ("Largest error", number(line.largest, 4)),
-            ("Mean standard error", number(line.standard_error, 4)),
-            ("Information bound", number(Some(line.bound), 4)),
+            ("Drives", Cell::count(line.drives)),
+            ("Identified", Cell::number(line.identified, 3)),
+            ("Coverage of 95 %", Cell::number(line.coverage, 3)),
+            ("same, t_nms known", Cell::number(line.coverage_at_t_nms, 3)),
+            ("Bias", Cell::number(line.bias, 4)),
+            ("RMS error", Cell::number(line.rms, 4)),
+            ("Largest error", Cell::number(line.largest, 4)),
+            ("Mean standard error", Cell::number(line.standard_error, 4)),
+            ("Information bound", Cell::number(line.bound, 4)),
         ]
     };
     Table::of_rows("", result.participants.iter().chain(&result.pooled).map(row))

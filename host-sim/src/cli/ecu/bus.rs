@@ -16,6 +16,5 @@ pub(in crate::cli) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("ecu bus")?;
     let load = Load::new(table());
-    let report = load.report();
-    output.show(&report, &report.stamp(&load), load.load <= load.max_load)
+    output.show(&load.report(), &load, load.load <= load.max_load)
 }

@@ -14,7 +14,7 @@ use haptic_pil::PilError;
 use haptic_pil::live::{Counts, Listener, Status, View};
 use serde_json::json;
 
-use super::super::{BadInput, Outcome, print};
+use super::super::{BadInput, Outcome, in_file, print};
 
 #[derive(Debug, Args)]
 #[command(group = clap::ArgGroup::new("source").required(true))]
@@ -125,9 +125,8 @@ struct Screen {
 
 impl Screen {
     fn play(&mut self, path: &Path) -> Result<(), End> {
-        let refuse = |what: &dyn std::fmt::Display| BadInput(format!("{}: {what}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|error| refuse(&error))?;
-        for recorded in candump::parse(&text).map_err(|error| refuse(&error))? {
+        let text = std::fs::read_to_string(path).map_err(in_file(path))?;
+        for recorded in candump::parse(&text).map_err(in_file(path))? {
             // A longer identifier is of another bus.
             let id = u16::try_from(recorded.id).ok();
             if let Some(frame) = id.and_then(|id| Frame::new(id, &recorded.data)) {
@@ -149,8 +148,7 @@ impl Screen {
             let time_s = epoch_s + start.elapsed().as_secs_f64();
             if let Some(frame) = &frame {
                 if let Some((file, path)) = &mut record {
-                    let written = candump::write(file, time_s, frame.id(), frame.data());
-                    written.map_err(|error| BadInput(format!("{}: {error}", path.display())))?;
+                    candump::write(file, time_s, frame.id(), frame.data()).map_err(in_file(path))?;
                 }
                 self.show(time_s, frame)?;
             } else if let Some(change) = self.view.wait(time_s) {
@@ -162,13 +160,11 @@ impl Screen {
             {
                 // What a crash of this computer may cost.
                 flush_s += self.every_s;
-                let flushed = file.flush();
-                flushed.map_err(|error| BadInput(format!("{}: {error}", path.display())))?;
+                file.flush().map_err(in_file(path))?;
             }
         }
         if let Some((mut file, path)) = record {
-            let flushed = file.flush();
-            flushed.map_err(|error| BadInput(format!("{}: {error}", path.display())))?;
+            file.flush().map_err(in_file(&path))?;
         }
         Ok(())
     }
@@ -190,25 +186,20 @@ impl Screen {
         if self.json {
             return Ok(());
         }
-        print(&line(
-            [
-                "time",
-                "mode",
-                "T_h",
-                "limit",
-                "T_d",
-                "wheel",
-                "e_y'",
-                "speed",
-                "K_hg noise arm",
-            ]
-            .map(String::from),
-            "faults",
-        ))?;
-        print(&line(
-            ["s", "", "N.m", "", "N.m", "deg", "m", "km/h", ""].map(String::from),
-            "",
-        ))
+        let names = [
+            "time",
+            "mode",
+            "T_h",
+            "limit",
+            "T_d",
+            "wheel",
+            "e_y'",
+            "speed",
+            "K_hg noise arm",
+        ];
+        let units = ["s", "", "N.m", "", "N.m", "deg", "m", "km/h", ""];
+        print(&line(names.map(String::from), "faults"))?;
+        print(&line(units.map(String::from), ""))
     }
 
     fn print_status(&self) -> Result<(), BadInput> {
@@ -232,7 +223,7 @@ impl Screen {
 
 /// A recording that cannot be made again is not overwritten.
 fn create(path: &Path) -> Result<(BufWriter<File>, PathBuf), BadInput> {
-    let file = File::create_new(path).map_err(|error| BadInput(format!("{}: {error}", path.display())))?;
+    let file = File::create_new(path).map_err(in_file(path))?;
     Ok((BufWriter::new(file), path.to_owned()))
 }
 
@@ -244,6 +235,7 @@ fn described(status: &Status) -> String {
         (Some(k_hg), Some(noise), Some(arm)) => format!("{k_hg:.2} {noise:.2} {arm:.2}"),
         _ => "-".into(),
     };
+    let speed = status.speed_m_per_s;
     line(
         [
             format!("{:.3}", status.time_s),
@@ -253,9 +245,7 @@ fn described(status: &Status) -> String {
             number(status.driver_torque_nm, 1.0, 2),
             number(status.wheel_angle_rad, 180.0 / std::f64::consts::PI, 1),
             number(status.e_y_m, 1.0, 2),
-            status
-                .speed_m_per_s
-                .map_or("-".into(), |speed| format!("{:.1}", speed * 3.6)),
+            speed.map_or("-".into(), |speed| format!("{:.1}", speed * 3.6)),
             k_hg,
         ],
         &status.faults.join(", "),

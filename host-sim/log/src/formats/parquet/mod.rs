@@ -21,13 +21,9 @@ use serde_json::{Value, json};
 use self::pages::Pages;
 use super::bytes::Budget;
 use crate::guard::guarded;
-use crate::recording::{Group, RecordingError, Series};
+use crate::recording::{Group, RecordingError, Series, refuse};
 
 const KEY: &str = "haptic.channels";
-
-fn refuse(e: impl std::fmt::Display) -> RecordingError {
-    RecordingError(e.to_string())
-}
 
 pub(super) fn read(file: Vec<u8>) -> Result<Vec<Series>, RecordingError> {
     // The reader is safe code, but not written for files that lie.
@@ -36,9 +32,7 @@ pub(super) fn read(file: Vec<u8>) -> Result<Vec<Series>, RecordingError> {
 
 fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
     if !nesting::is_shallow(&file) {
-        return Err(refuse(
-            "this is no Parquet file, or its schema is nested too deep",
-        ));
+        return Err("this is no Parquet file, or its schema is nested too deep".into());
     }
     let reader = SerializedFileReader::new(file.clone()).map_err(refuse)?;
     let metadata = reader.metadata();
@@ -49,15 +43,12 @@ fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
         .and_then(|pair| serde_json::from_str(pair.value.as_deref()?).ok())
         .unwrap_or_default();
     let schema = metadata.file_metadata().schema_descr();
-    let kinds: Vec<Option<Kind>> = schema
-        .columns()
-        .iter()
-        .map(|column| Kind::from_column(column))
-        .collect();
     let mut budget = Budget::new(&file);
     let mut found = Vec::new();
-    for (c, kind) in kinds.into_iter().enumerate() {
-        let Some(kind) = kind else { continue };
+    for (c, column) in schema.columns().iter().enumerate() {
+        let Some(kind) = Kind::from_column(column) else {
+            continue;
+        };
         let name = schema.column(c).name().to_owned();
         let mut values = Vec::new();
         for group in metadata.row_groups() {
@@ -66,14 +57,11 @@ fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
                 .and_then(|pages| append(schema.column(c), pages, kind, &mut values, &mut budget));
             let read = read.map_err(|e| refuse(format!("channel {name}: {e}")))?;
             if read != rows {
-                return Err(refuse(format!(
-                    "channel {name}: {read} values in a group of {rows} rows"
-                )));
+                return Err(format!("channel {name}: {read} values in a group of {rows} rows").into());
             }
         }
-        let entry = said
-            .as_array()
-            .and_then(|all| all.iter().find(|c| c["name"] == name.as_str()));
+        let is_it = |c: &&Value| c["name"] == name.as_str();
+        let entry = said.as_array().and_then(|all| all.iter().find(is_it));
         let text = |key: &str| entry.and_then(|e| e[key].as_str()).unwrap_or_default().to_owned();
         found.push(Series {
             // What is a date counts in parts of a second.
@@ -101,16 +89,11 @@ impl Kind {
     /// None for what is no number.
     fn from_column(column: &ColumnDescriptor) -> Option<Self> {
         use ConvertedType as Old;
+        use Physical::{BOOLEAN, DOUBLE, FLOAT, INT32, INT64};
         if column.path().parts().len() != 1 || column.max_rep_level() > 0 || column.max_def_level() > 1 {
             return None;
         }
-        let numbers = [
-            Physical::BOOLEAN,
-            Physical::INT32,
-            Physical::INT64,
-            Physical::FLOAT,
-            Physical::DOUBLE,
-        ];
+        let is_number = matches!(column.physical_type(), BOOLEAN | INT32 | INT64 | FLOAT | DOUBLE);
         let in_parts = |unit| Self {
             unit: Some(unit),
             ..Self::default()
@@ -134,7 +117,7 @@ impl Kind {
             (None, Old::NONE | Old::INT_8 | Old::INT_16 | Old::INT_32 | Old::INT_64) => Self::default(),
             _ => return None,
         };
-        numbers.contains(&column.physical_type()).then_some(kind)
+        is_number.then_some(kind)
     }
 }
 
@@ -161,9 +144,8 @@ fn append(
                 return Ok(out.len() - before);
             }
             // A column of one value takes no room in a file.
-            budget
-                .take(rows)
-                .map_err(|e| ParquetError::General(e.to_string()))?;
+            let taken = budget.take(rows);
+            taken.map_err(|e| ParquetError::General(e.to_string()))?;
             let mut there = values.iter().map(&number);
             if has_gaps {
                 let level = |level: &i16| if *level > 0 { there.next() } else { None };
@@ -200,10 +182,9 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     let all: Vec<&Series> = std::iter::once(&time).chain(&group.channels).collect();
     let fields = all.iter().map(|channel| {
         let optional = channel.values.iter().any(|value| value.is_nan());
-        let repetition = if optional {
-            Repetition::OPTIONAL
-        } else {
-            Repetition::REQUIRED
+        let repetition = match optional {
+            true => Repetition::OPTIONAL,
+            false => Repetition::REQUIRED,
         };
         Type::primitive_type_builder(&channel.name, Physical::DOUBLE)
             .with_repetition(repetition)
@@ -235,22 +216,12 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
         let Some(mut column) = rows.next_column().map_err(refuse)? else {
             return Err(refuse("a column is missing"));
         };
-        let there: Vec<f64> = channel
-            .values
-            .iter()
-            .copied()
-            .filter(|value| !value.is_nan())
-            .collect();
-        let levels: Vec<i16> = channel
-            .values
-            .iter()
-            .map(|value| i16::from(!value.is_nan()))
-            .collect();
+        let values = channel.values.iter().copied();
+        let there: Vec<f64> = values.clone().filter(|value| !value.is_nan()).collect();
+        let levels: Vec<i16> = values.map(|value| i16::from(!value.is_nan())).collect();
         let levels = (there.len() < levels.len()).then_some(&levels[..]);
-        column
-            .typed::<DoubleType>()
-            .write_batch(&there, levels, None)
-            .map_err(refuse)?;
+        let written = column.typed::<DoubleType>().write_batch(&there, levels, None);
+        written.map_err(refuse)?;
         column.close().map_err(refuse)?;
     }
     rows.close().map_err(refuse)?;

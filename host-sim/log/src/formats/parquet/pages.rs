@@ -44,10 +44,8 @@ impl Pages {
                  pandas.read_parquet(\"IN.parquet\").to_parquet(\"OUT.parquet\", compression=\"zstd\")"
             ));
         }
-        let plain = column
-            .clone()
-            .into_builder()
-            .set_compression(Compression::UNCOMPRESSED);
+        let plain = column.clone().into_builder();
+        let plain = plain.set_compression(Compression::UNCOMPRESSED);
         Ok(Self {
             packed: SerializedPageReader::new(Arc::new(file.clone()), &plain.build()?, rows, None)?,
             compression,
@@ -61,9 +59,9 @@ impl Pages {
                 *buf = unpack(self.compression, buf)?;
                 // A number takes four bytes at least.
                 if *num_values as usize > buf.len() / 4 {
+                    let bytes = buf.len();
                     return refuse(format!(
-                        "a dictionary of {} bytes has no {num_values} values",
-                        buf.len()
+                        "a dictionary of {bytes} bytes has no {num_values} values"
                     ));
                 }
                 self.has_dictionary = true;
@@ -120,14 +118,11 @@ fn unpack(compression: Compression, packed: &[u8]) -> Result<Bytes> {
         Compression::SNAPPY => {
             let size = snap::raw::decompress_len(packed).map_err(|e| damaged(&e))?;
             if size > packed.len().saturating_mul(SNAPPY_MOST) {
-                return refuse(format!(
-                    "a page of {} bytes does not unpack to {size}",
-                    packed.len()
-                ));
+                let bytes = packed.len();
+                return refuse(format!("a page of {bytes} bytes does not unpack to {size}"));
             }
-            snap::raw::Decoder::new()
-                .decompress_vec(packed)
-                .map_err(|e| damaged(&e))?
+            let unpacked = snap::raw::Decoder::new().decompress_vec(packed);
+            unpacked.map_err(|e| damaged(&e))?
         }
         Compression::LZ4_RAW => {
             let largest = packed.len().saturating_mul(LZ4_MOST).min(LARGEST);

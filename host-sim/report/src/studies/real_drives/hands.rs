@@ -1,7 +1,7 @@
 //! Hands and override on recordings of real people.
 
 use crate::document::{Block, Cell, Table};
-use crate::plot::{Axis, Figure, Panel, Series};
+use crate::plot::{Axis, Figure, Series};
 use haptic_batch::real_drives::{End, Ending, Fed, Feed, Hands};
 
 /// The section's blocks.
@@ -19,14 +19,11 @@ pub(super) fn section(hands: &Hands) -> Vec<Block> {
          above 0.8 N.m against the guidance {taps} last up to 0.2 s, {short} up to 1 s and {long} longer.",
         hands.recordings, hands.longest_s, hands.area
     );
+    let caption = "Seconds in which a hand is felt, by the threshold: the ECU's own code with 1/8 to 64 times its thresholds of 0.08 N.m (change) \
+                   and 0.35 N.m (size). Top right the lowest one.";
     vec![
         Block::Text(text),
-        Block::figure(
-            "hands",
-            curve(hands),
-            "Seconds in which a hand is felt, by the threshold: the ECU's own code with 1/8 to 64 times its thresholds of 0.08 N.m (change) \
-             and 0.35 N.m (size). Top right the lowest one.",
-        ),
+        Block::figure("hands", curve(hands), caption),
         Block::Table(hours(hands)),
         Block::Table(endings(hands)),
         Block::Table(ends(hands)),
@@ -36,23 +33,15 @@ pub(super) fn section(hands: &Hands) -> Vec<Block> {
 fn curve(hands: &Hands) -> Figure {
     let point = |felt: [f64; 2]| (100.0 * felt[1], 100.0 * felt[0]);
     let all = hands.curve.iter().map(|threshold| point(threshold.felt));
-    let all = std::iter::once((100.0, 100.0))
-        .chain(all)
-        .chain([(0.0, 0.0)])
-        .collect();
-    Figure {
-        x: Axis::new("felt in shared driving", "%").within(0.0, 100.0),
-        panels: vec![Panel::new(
-            "",
-            Axis::new("felt by hand", "%").within(0.0, 102.0),
-            vec![
-                Series::line("no difference", 0, vec![(0.0, 0.0), (100.0, 100.0)]),
-                Series::line("by threshold", 1, all),
-                Series::dots("the ECU's threshold", 2, vec![point(hands.own().felt)]),
-            ],
-        )],
-        ..Figure::default()
-    }
+    let all = std::iter::once((100.0, 100.0)).chain(all).chain([(0.0, 0.0)]);
+    let panel = Axis::new("felt by hand", "%").within(0.0, 102.0).panel([
+        Series::line("no difference", 0, vec![(0.0, 0.0), (100.0, 100.0)]),
+        Series::line("by threshold", 1, all.collect()),
+        Series::dots("the ECU's threshold", 2, vec![point(hands.own().felt)]),
+    ]);
+    Axis::new("felt in shared driving", "%")
+        .within(0.0, 100.0)
+        .figure([panel])
 }
 
 fn between(feed: Feed) -> Cell {
@@ -65,75 +54,58 @@ fn between(feed: Feed) -> Cell {
 
 fn hours(hands: &Hands) -> Table {
     let row = |fed: &Fed| {
-        let [by_hand, shared] = [0, 1].map(|part| [fed.hours[part], fed.guided_h[part]]);
-        let mut cells = vec![between(fed.feed)];
-        cells.extend([by_hand, shared].concat().into_iter().map(|h| Cell::number(h, 4)));
-        cells.push(Cell::number(3600.0 * fed.overridden_h, 2));
-        cells
+        [
+            ("Between rows", between(fed.feed)),
+            ("By hand, h", Cell::number(fed.hours[0], 4)),
+            ("guided, h", Cell::number(fed.guided_h[0], 4)),
+            ("Shared, h", Cell::number(fed.hours[1], 4)),
+            ("guided, h", Cell::number(fed.guided_h[1], 4)),
+            ("Overridden, s", Cell::number(3600.0 * fed.overridden_h, 2)),
+        ]
     };
-    Table::new(
+    Table::of_rows(
         "The recordings as frames of the ECU's bus at its own rates; between two rows of 0.1 s the values are on a line or held, or nothing is \
          sent. Guidance is asked for throughout, and again 5 s after each end; the torque is the recorded one.",
-        [
-            "Between rows",
-            "By hand, h",
-            "guided, h",
-            "Shared, h",
-            "guided, h",
-            "Overridden, s",
-        ],
         hands.feeds.iter().map(row),
     )
 }
 
 fn endings(hands: &Hands) -> Table {
     let row = |(fed, end): (&Fed, &Ending)| {
-        let rates = end.rates.iter().flat_map(|rate| {
-            let [low, high] = rate.interval;
-            [
-                Cell::number(rate.count as f64, 0),
-                Cell::number(rate.per_hour, 1),
-                Cell::number(low, 1),
-                Cell::number(high, 1),
-            ]
-        });
-        [between(fed.feed), Cell::text(&end.faults)]
+        let rates = ["By hand", "Shared"]
             .into_iter()
-            .chain(rates)
-            .collect::<Vec<_>>()
+            .zip(&end.rates)
+            .flat_map(|(driving, rate)| {
+                let [low, high] = Cell::ends(rate.interval, 1);
+                [
+                    (driving, Cell::count(rate.count)),
+                    ("1/h", Cell::number(rate.per_hour, 1)),
+                    ("from", low),
+                    ("to", high),
+                ]
+            });
+        let head = [
+            ("Between rows", between(fed.feed)),
+            ("Ended by", Cell::text(&end.faults)),
+        ];
+        head.into_iter().chain(rates).collect::<Vec<_>>()
     };
-    let all = hands
-        .feeds
-        .iter()
-        .flat_map(|fed| fed.endings.iter().map(move |end| (fed, end)));
-    Table::new(
+    let feeds = hands.feeds.iter();
+    let all = feeds.flat_map(|fed| fed.endings.iter().map(move |end| (fed, end)));
+    Table::of_rows(
         "What would have ended guidance, in an hour with it, with the 95 % interval of a Poisson rate. The recordings have no lane at a camera's \
          rate, no second speed and no report of the motor. The lane is the way that the vehicle goes, the speed is sent twice, the motor does \
          what the ECU says: what checks these cannot act. Slower than 5 m/s is no fault and not counted.",
-        [
-            "Between rows",
-            "Ended by",
-            "By hand",
-            "1/h",
-            "from",
-            "to",
-            "Shared",
-            "1/h",
-            "from",
-            "to",
-        ],
         all.map(row),
     )
 }
 
 fn ends(hands: &Hands) -> Table {
     let row = |end: &End| {
+        let driving = if end.shared { "shared" } else { "by hand" };
         [
             ("Recording", Cell::text(&end.file)),
-            (
-                "Driving",
-                Cell::text(if end.shared { "shared" } else { "by hand" }),
-            ),
+            ("Driving", Cell::text(driving)),
             ("At, s", Cell::number(end.time_s, 1)),
             ("Ended by", Cell::text(&end.faults)),
             ("T_d, N.m", Cell::number(end.driver_nm, 2)),

@@ -1,8 +1,9 @@
 //! The figures of a sweep.
 
-use super::words::{OWN_UNIT, by_weight, label, lower, metric};
-use crate::plot::{Axis, Figure, Mark, Marker, Panel, Series};
-use haptic_batch::sweep::{Compared, Drives, Effect, Summary};
+use super::super::place;
+use super::words::{OWN_UNIT, by_weight, label, lower, metric, share};
+use crate::plot::{Axis, Figure, Mark, Marker, Series};
+use haptic_batch::sweep::{Compared, Drives, Effect, SobolIndex, Summary};
 
 /// Fields that are drawn: of more, those that matter most.
 const DRAWN: usize = 6;
@@ -15,19 +16,11 @@ pub(super) fn distribution(summary: &Summary) -> Named {
     let (name, unit) = metric(summary.judge);
     let of = summary.distributions.iter().find(|of| of.metric == summary.judge);
     let points = of.map(|of| of.cumulative.clone()).unwrap_or_default();
-    let markers = summary.limit.map(|x| Marker {
-        label: "limit".into(),
-        x,
-    });
+    let markers = summary.limit.map(|x| Marker::new("limit", x));
+    let share = Axis::new("Share of the drives", "-").within(0.0, 1.0);
     let figure = Figure {
-        x: Axis::new(&name, unit),
-        panels: vec![Panel::new(
-            "",
-            Axis::new("Share of the drives", "-").within(0.0, 1.0),
-            vec![Series::line("", 0, points)],
-        )],
         markers: markers.into_iter().collect(),
-        ..Figure::default()
+        ..Axis::new(&name, unit).figure([share.panel([Series::line("", 0, points)])])
     };
     let caption = "Share of the drives at or below each value.";
     ("distribution".into(), caption.into(), figure)
@@ -35,68 +28,36 @@ pub(super) fn distribution(summary: &Summary) -> Named {
 
 /// A row for each field.
 pub(super) fn influence(summary: &Summary) -> Option<Named> {
-    let at = |i: usize| (i + 1) as f64;
-    let (rows, series): (Vec<String>, Vec<Series>) = if summary.sobol.is_empty() {
-        let share = |effect: &Effect| {
-            effect
-                .shares
-                .iter()
-                .find(|(metric, _)| *metric == summary.judge)?
-                .1
-        };
-        let points = summary
-            .effects
-            .iter()
-            .enumerate()
-            .map(|(i, effect)| (at(i), share(effect).unwrap_or(f64::NAN)));
-        let rows = summary
-            .effects
-            .iter()
-            .map(|effect| effect.field.clone())
-            .collect();
-        (rows, vec![Series::dots("by itself", 1, points.collect())])
+    let judge = label(summary.judge);
+    let axis = Axis::new("Share of the variance", "-").within(-0.03, 1.03);
+    let (caption, figure) = if summary.sobol.is_empty() {
+        let effects = summary.effects.iter();
+        let shares = effects
+            .clone()
+            .map(|effect| share(effect, summary.judge).unwrap_or(f64::NAN));
+        let points = shares.enumerate().map(|(i, share)| (place(i), share));
+        let panel = axis.panel([Series::dots("by itself", 1, points.collect())]);
+        (
+            format!("Share of the variance of {judge} that each field explains by itself."),
+            Figure::of_rows(effects.map(|effect| &effect.field), [panel]),
+        )
     } else {
-        let own: Vec<_> = summary
-            .sobol
-            .iter()
-            .filter(|index| index.metric == summary.judge)
-            .collect();
-        let of = |label: &str, style, aside: f64, value: fn(&haptic_batch::sweep::SobolIndex) -> [f64; 2]| {
-            let points = own
-                .iter()
-                .enumerate()
-                .map(|(i, index)| (at(i) + aside, value(index)[0]))
-                .collect();
-            let ends = own
-                .iter()
-                .map(|index| value(index))
-                .map(|[x, se]| [x - 1.96 * se, x + 1.96 * se])
-                .collect();
+        let own = || summary.sobol.iter().filter(|index| index.metric == summary.judge);
+        let of = |label: &str, style, aside: f64, value: fn(&SobolIndex) -> [f64; 2]| {
+            let found = own().map(value).enumerate();
+            let (points, ends) = found
+                .map(|(i, [x, se])| ((place(i) + aside, x), [x - 1.96 * se, x + 1.96 * se]))
+                .unzip();
             Series::with_mark(label, style, Mark::Whiskers(ends), points)
         };
-        let rows = own.iter().map(|index| index.field.clone()).collect();
+        let panel = axis.panel([
+            of("first order", 1, -0.1, |i| i.first),
+            of("total", 2, 0.1, |i| i.total),
+        ]);
         (
-            rows,
-            vec![
-                of("first order", 1, -0.1, |i| i.first),
-                of("total", 2, 0.1, |i| i.total),
-            ],
+            format!("Sobol indices of {judge} with their standard errors."),
+            Figure::of_rows(own().map(|index| &index.field), [panel]),
         )
-    };
-    let judge = label(summary.judge);
-    let caption = if summary.sobol.is_empty() {
-        format!("Share of the variance of {judge} that each field explains by itself.")
-    } else {
-        format!("Sobol indices of {judge} with their standard errors.")
-    };
-    let figure = Figure {
-        panels: vec![Panel::new(
-            "",
-            Axis::new("Share of the variance", "-").within(-0.03, 1.03),
-            series,
-        )],
-        rows,
-        ..Figure::default()
     };
     (!figure.rows.is_empty()).then(|| ("influence".into(), caption, figure))
 }
@@ -106,19 +67,12 @@ pub(super) fn responses(summary: &Summary) -> Vec<Named> {
     let mut fields = by_weight(summary);
     fields.retain(|effect| effect.levels.len() > 1 && (!effect.best.is_empty() || has_compared(effect)));
     fields.truncate(DRAWN);
-    let plain = |c: char| {
-        if c.is_ascii_alphanumeric() || "._-".contains(c) {
-            c
-        } else {
-            '_'
-        }
-    };
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     let named = |effect: &Effect| {
-        let name = effect.field.chars().map(plain).collect::<String>();
-        let by = if effect.sliced {
-            ", by sixteenths of its distribution"
-        } else {
-            ""
+        let name = effect.field.replace(|c| !is_plain(c), "_");
+        let by = match effect.sliced {
+            true => ", by sixteenths of its distribution",
+            false => "",
         };
         let caption = format!("Along {}{by}.", effect.field);
         (format!("response-{name}"), caption, response(summary, effect))
@@ -128,48 +82,33 @@ pub(super) fn responses(summary: &Summary) -> Vec<Named> {
 
 fn response(summary: &Summary, effect: &Effect) -> Figure {
     let numbers = effect.levels.iter().all(|level| level.x.is_some());
-    let places: Vec<f64> = if numbers {
-        effect.levels.iter().filter_map(|level| level.x).collect()
-    } else {
-        (1..=effect.levels.len()).map(|i| i as f64).collect()
+    let places: Vec<f64> = match numbers {
+        true => effect.levels.iter().filter_map(|level| level.x).collect(),
+        false => (0..effect.levels.len()).map(place).collect(),
     };
     let (name, unit) = metric(summary.judge);
-    let mut panels = vec![Panel::new(
-        "",
-        Axis::new(&format!("Mean {}", lower(&name)), unit),
-        series(summary, effect, &places, numbers, |drives| {
-            (drives.mean, drives.interval)
-        }),
-    )];
+    let mean = Axis::new(&format!("Mean {}", lower(&name)), unit);
+    let known: Known = |drives| (drives.mean, drives.interval);
+    let mut panels = vec![mean.panel(series(summary, effect, &places, numbers, known))];
     if summary.limit.is_some() {
-        panels.push(Panel::new(
-            "",
-            Axis::new("Bad drives", "%"),
-            series(summary, effect, &places, numbers, |drives| {
-                let ends = drives.beyond_interval.map(|ends| ends.map(|share| 100.0 * share));
-                (drives.beyond.map(|share| 100.0 * share), ends)
-            }),
-        ));
+        let known: Known = |drives| {
+            let ends = drives.beyond_interval.map(|ends| ends.map(|share| 100.0 * share));
+            (drives.beyond.map(|share| 100.0 * share), ends)
+        };
+        let bad = Axis::new("Bad drives", "%");
+        panels.push(bad.panel(series(summary, effect, &places, numbers, known)));
     }
-    let diverged = effect
-        .levels
-        .iter()
-        .zip(&places)
-        .filter(|(level, _)| numbers && level.drives.diverged > 0);
-    let markers = diverged.map(|(_, x)| Marker {
-        label: "drives diverged: their metrics end early".into(),
-        x: *x,
-    });
+    let x = Axis::new(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT));
+    let levels = effect.levels.iter();
+    if !numbers {
+        let rows = Figure::of_rows(levels.map(|level| &level.label), panels);
+        return Figure { x, ..rows };
+    }
+    let diverged = levels.zip(&places).filter(|(level, _)| level.drives.diverged > 0);
+    let label = "drives diverged: their metrics end early";
     Figure {
-        x: Axis::new(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
-        rows: if numbers {
-            Vec::new()
-        } else {
-            effect.levels.iter().map(|level| level.label.clone()).collect()
-        },
-        panels,
-        markers: markers.collect(),
-        ..Figure::default()
+        markers: diverged.map(|(_, x)| Marker::new(label, *x)).collect(),
+        ..x.figure(panels)
     }
 }
 
@@ -190,11 +129,8 @@ fn series(summary: &Summary, effect: &Effect, places: &[f64], joined: bool, know
     };
     let levels = || places.iter().copied().zip(&effect.levels);
     if let Some(compare) = summary.compare.as_ref().filter(|_| has_compared(effect)) {
-        let longest = effect
-            .levels
-            .iter()
-            .map(|level| &level.compared)
-            .max_by_key(|parts| parts.len());
+        let parts = effect.levels.iter().map(|level| &level.compared);
+        let longest = parts.max_by_key(|parts| parts.len());
         let part = |(i, own): (usize, &Compared)| {
             let values = levels().map(|(x, level)| {
                 let same = level.compared.iter().find(|other| other.label == own.label);
@@ -204,18 +140,12 @@ fn series(summary: &Summary, effect: &Effect, places: &[f64], joined: bool, know
         };
         return longest.into_iter().flatten().enumerate().map(part).collect();
     }
-    let all = line(
-        "mean, with its 95 % interval",
-        1,
-        levels().map(|(x, level)| (x, Some(&level.drives))).collect(),
-    );
+    let all = levels().map(|(x, level)| (x, Some(&level.drives))).collect();
     let best = levels().filter(|(_, level)| effect.best.contains(&level.label));
-    let best = best
-        .filter_map(|(x, level)| Some((x, known(&level.drives).0?)))
-        .collect();
+    let best = best.filter_map(|(x, level)| Some((x, known(&level.drives).0?)));
     vec![
-        all,
-        Series::dots("best, with what is not told apart from it", 3, best),
+        line("mean, with its 95 % interval", 1, all),
+        Series::dots("best, with what is not told apart from it", 3, best.collect()),
     ]
 }
 

@@ -39,11 +39,8 @@ pub fn report(sweep: &Sweep, summary: &Summary, file: &str) -> Report {
         last.blocks.push(Block::Table(definitions_table()).on_page());
     }
     Report {
-        title: "Sweep".into(),
-        summary: headline(sweep, summary),
-        sections,
         provenance: Provenance::new(Some(sweep.text().into())),
-        ..Report::default()
+        ..Report::new("Sweep", headline(sweep, summary), sections)
     }
 }
 
@@ -92,26 +89,16 @@ fn design(sweep: &Sweep) -> String {
 
 /// What a sweep plans.
 pub fn plan(sweep: &Sweep) -> Report {
-    let columns = ["drive", "seed"]
-        .into_iter()
-        .chain(sweep.columns())
-        .map(String::from);
+    let columns = ["drive", "seed"].into_iter().chain(sweep.columns());
     let rows = (0..sweep.drives().min(FIRST_ROWS)).map(|drive| {
         let point = sweep.point(drive);
         let own = [Cell::number(drive as f64, 0), Cell::Text(point.seed.to_string())];
         own.into_iter().chain(values(&point).map(Cell::Text)).collect()
     });
     let table = Table::new("", columns, rows);
-    Report {
-        summary: format!(
-            "{} drives in {} chunks{}",
-            sweep.drives(),
-            sweep.chunks(),
-            design(sweep)
-        ),
-        sections: vec![Section::new("", vec![Block::Table(table)])],
-        ..Report::default()
-    }
+    let (drives, chunks, design) = (sweep.drives(), sweep.chunks(), design(sweep));
+    let summary = format!("{drives} drives in {chunks} chunks{design}");
+    Report::new("", summary, vec![Section::new("", vec![Block::Table(table)])])
 }
 
 fn values(point: &DesignPoint) -> impl Iterator<Item = String> {
@@ -125,10 +112,8 @@ fn values(point: &DesignPoint) -> impl Iterator<Item = String> {
 pub fn drive_table(sweep: &Sweep, point: &DesignPoint, driven: &Driven) -> Table {
     let varied = sweep.columns().map(String::from).zip(values(point));
     let metric = |(definition, value): (&&Definition, &Option<f64>)| {
-        (
-            definition.name.to_string(),
-            value.map_or("-".into(), |value| value.to_string()),
-        )
+        let value = value.map_or("-".into(), |value| value.to_string());
+        (definition.name.to_string(), value)
     };
     let own = [
         ("drive".to_string(), point.drive.to_string()),

@@ -2,7 +2,7 @@
 
 use super::words::{OWN_UNIT, by_weight, decimals, heading, label, lower, metric};
 use crate::document::{Cell, Table};
-use haptic_batch::sweep::{Effect, Summary, Sweep};
+use haptic_batch::sweep::{Distribution, Effect, Level, SobolIndex, Summary, Sweep, Worst};
 
 /// Of distributions and of what is compared a terminal shows the fields that matter most.
 const SHOWN: usize = 2;
@@ -24,27 +24,12 @@ pub(super) fn tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table>
 /// fields that matter most.
 pub(super) fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
     let judge = summary.judge;
-    let own = Summary {
-        effects: summary
-            .effects
-            .iter()
-            .cloned()
-            .map(|effect| of_metric(effect, judge))
-            .collect(),
-        sobol: summary
-            .sobol
-            .iter()
-            .filter(|index| index.metric == judge)
-            .cloned()
-            .collect(),
-        distributions: summary
-            .distributions
-            .iter()
-            .filter(|of| of.metric == judge)
-            .cloned()
-            .collect(),
-        ..summary.clone()
-    };
+    let mut own = summary.clone();
+    for effect in &mut own.effects {
+        effect.shares.retain(|(name, _)| *name == judge);
+    }
+    own.sobol.retain(|index| index.metric == judge);
+    own.distributions.retain(|of| of.metric == judge);
     let sliced = by_weight(summary).into_iter().filter(|effect| effect.sliced);
     let most: Vec<&str> = sliced.take(SHOWN).map(|effect| effect.field.as_str()).collect();
     vec![
@@ -59,16 +44,11 @@ pub(super) fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<
     ]
 }
 
-fn of_metric(mut effect: Effect, metric: &str) -> Effect {
-    effect.shares.retain(|(name, _)| *name == metric);
-    effect
-}
-
 fn distributions(summary: &Summary) -> Table {
-    let row = |of: &haptic_batch::sweep::Distribution| {
+    let row = |of: &Distribution| {
         let digits = decimals(of.metric);
         let number = |value| Cell::number(value, digits);
-        let mut cells = vec![Cell::Text(heading(of.metric)), Cell::number(of.count as f64, 0)];
+        let mut cells = vec![Cell::Text(heading(of.metric)), Cell::count(of.count)];
         cells.extend([number(of.mean), number(of.sd), number(of.min)]);
         cells.extend(of.quantiles.iter().map(|(_, value)| number(Some(*value))));
         cells.resize(11, number(None));
@@ -86,14 +66,11 @@ fn distributions(summary: &Summary) -> Table {
 }
 
 fn shares(summary: &Summary) -> Table {
-    let mut columns = vec!["Field".to_string()];
-    columns.extend(summary.distributions.iter().map(|of| label(of.metric)));
+    let labels = summary.distributions.iter().map(|of| label(of.metric));
+    let columns = ["Field".into()].into_iter().chain(labels);
     let row = |effect: &Effect| {
         let shares = effect.shares.iter().map(|(_, value)| Cell::number(*value, 3));
-        [Cell::Text(effect.field.clone())]
-            .into_iter()
-            .chain(shares)
-            .collect()
+        [Cell::text(&effect.field)].into_iter().chain(shares).collect()
     };
     Table::new(
         "Share of each metric's variance that a field explains by itself; 0 also where the drives are too few to show one",
@@ -103,36 +80,26 @@ fn shares(summary: &Summary) -> Table {
 }
 
 fn indices(summary: &Summary) -> Table {
-    let number = |value| Cell::number(value, 3);
-    let row = |index: &haptic_batch::sweep::SobolIndex| {
-        let [first, total] = [index.first, index.total];
-        let mut cells = vec![Cell::Text(label(index.metric)), Cell::Text(index.field.clone())];
-        cells.extend([first[0], first[1], total[0], total[1]].map(number));
-        cells
+    let row = |index: &SobolIndex| {
+        [
+            ("Metric", Cell::Text(label(index.metric))),
+            ("Field", Cell::text(&index.field)),
+            ("First order", Cell::number(index.first[0], 3)),
+            ("SE", Cell::number(index.first[1], 3)),
+            ("Total", Cell::number(index.total[0], 3)),
+            ("SE ", Cell::number(index.total[1], 3)),
+        ]
     };
-    Table::new(
-        "Sobol indices: share of the variance by a field alone, and with all others",
-        ["Metric", "Field", "First order", "SE", "Total", "SE "],
-        summary.sobol.iter().map(row),
-    )
+    let caption = "Sobol indices: share of the variance by a field alone, and with all others";
+    Table::of_rows(caption, summary.sobol.iter().map(row))
 }
 
 /// The metric that judges along each field; which level is best is said where one is told apart from another.
 fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
     let (name, unit) = metric(summary.judge);
-    let mut columns = ["Field", "Value", "Unit", "Verdict", "Drives", "Diverged"]
-        .map(String::from)
-        .to_vec();
-    columns.extend([
-        format!("Mean {} ({unit})", lower(&name)),
-        "95 % from".into(),
-        "to".into(),
-    ]);
-    if summary.limit.is_some() {
-        columns.extend(["Bad (%)", "95 % from", "to"].map(String::from));
-    }
+    let mean = format!("Mean {} ({unit})", lower(&name));
     let digits = decimals(summary.judge);
-    let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
+    let row = |effect: &Effect, level: &Level| {
         let drives = &level.drives;
         let unit = effect.unit.as_deref().unwrap_or(OWN_UNIT);
         let verdict = match effect.best.contains(&level.label) {
@@ -140,42 +107,41 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
             true => "best",
             false => "",
         };
-        let mut cells = [&effect.field, &level.label, unit, verdict]
-            .map(Cell::text)
-            .to_vec();
-        cells.extend([drives.count, drives.diverged].map(|count| Cell::number(count as f64, 0)));
-        let mut known = |value: Option<f64>, interval: Option<[f64; 2]>, decimals| {
-            let ends = interval.map_or([None; 2], |ends| ends.map(Some));
-            cells.extend([value, ends[0], ends[1]].map(|value| Cell::number(value, decimals)));
+        let mut cells = vec![
+            ("Field", Cell::text(&effect.field)),
+            ("Value", Cell::text(&level.label)),
+            ("Unit", Cell::text(unit)),
+            ("Verdict", Cell::text(verdict)),
+            ("Drives", Cell::count(drives.count)),
+            ("Diverged", Cell::count(drives.diverged)),
+        ];
+        let mut known = |name, value: Option<f64>, interval: Option<[f64; 2]>, decimals| {
+            let [low, high] = Cell::ends(interval, decimals);
+            cells.extend([
+                (name, Cell::number(value, decimals)),
+                ("95 % from", low),
+                ("to", high),
+            ]);
         };
-        known(drives.mean, drives.interval, digits);
+        known(mean.as_str(), drives.mean, drives.interval, digits);
         if summary.limit.is_some() {
             let percent = |share: f64| 100.0 * share;
-            known(
-                drives.beyond.map(percent),
-                drives.beyond_interval.map(|ends| ends.map(percent)),
-                2,
-            );
+            let interval = drives.beyond_interval.map(|ends| ends.map(percent));
+            known("Bad (%)", drives.beyond.map(percent), interval, 2);
         }
         cells
     };
     let effects = by_weight(summary);
     let rows = effects.iter().filter(|effect| shown(effect));
     let rows = rows.flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
-    let alike: Vec<&str> = effects
-        .iter()
-        .filter(|e| e.best.is_empty())
-        .map(|e| e.field.as_str())
-        .collect();
+    let alike = effects.iter().filter(|e| e.best.is_empty());
+    let alike: Vec<&str> = alike.map(|e| e.field.as_str()).collect();
     let alike = match alike[..] {
         [] => String::new(),
         _ => format!("; nothing is told apart along {}", alike.join(", ")),
     };
-    Table::new(
-        format!("By value of each field (of a distribution: by sixteenths){alike}"),
-        columns,
-        rows,
-    )
+    let caption = format!("By value of each field (of a distribution: by sixteenths){alike}");
+    Table::of_rows(caption, rows)
 }
 
 /// What the values of one field do along the others, those that matter most first.
@@ -189,66 +155,53 @@ fn compared(summary: &Summary, most: usize) -> Table {
             level.compared.iter().map(|own| own.label.clone()).collect()
         })
     });
-    let [what, unit] = match summary.limit {
-        Some(_) => ["Bad drives".to_string(), " (%)".into()],
-        None => [format!("Mean {}", label(summary.judge)), String::new()],
+    let (what, unit, digits) = match summary.limit {
+        Some(_) => ("Bad drives".into(), " (%)", 2),
+        None => (
+            format!("Mean {}", label(summary.judge)),
+            "",
+            decimals(summary.judge),
+        ),
     };
-    let digits = if summary.limit.is_some() {
-        2
-    } else {
-        decimals(summary.judge)
-    };
-    let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
+    let row = |effect: &Effect, level: &Level| {
         let value = |label: &String| {
             let own = level.compared.iter().find(|own| own.label == *label);
             let value = own.and_then(|own| own.drives.beyond.map(|share| 100.0 * share).or(own.drives.mean));
-            Cell::number(value, digits)
+            (format!("{label}{unit}"), Cell::number(value, digits))
         };
-        let mut cells = vec![
-            Cell::Text(effect.field.clone()),
-            Cell::Text(level.label.clone()),
-            Cell::number(level.drives.count as f64, 0),
+        let head = [
+            ("Field".into(), Cell::text(&effect.field)),
+            ("Value".into(), Cell::text(&level.label)),
+            ("Drives".into(), Cell::count(level.drives.count)),
         ];
-        cells.extend(labels.iter().map(value));
-        cells
+        head.into_iter()
+            .chain(labels.iter().map(value))
+            .collect::<Vec<_>>()
     };
-    let rows = effects
-        .iter()
-        .take(most)
-        .flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
-    let mut columns: Vec<String> = ["Field", "Value", "Drives"].map(String::from).to_vec();
-    columns.extend(labels.iter().map(|own| format!("{own}{unit}")));
-    Table::new(
-        format!("{what} by {compare}, along the other fields"),
-        columns,
-        rows,
-    )
+    let effects = effects.iter().take(most);
+    let rows = effects.flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
+    Table::of_rows(format!("{what} by {compare}, along the other fields"), rows)
 }
 
 fn worst(sweep: &Sweep, summary: &Summary, file: &str) -> Table {
-    let mut columns = vec!["Drive".to_string()];
-    columns.extend(sweep.columns().map(String::from));
-    columns.extend([heading(summary.judge), "Ended".into(), "Again".into()]);
-    let row = |drive: &haptic_batch::sweep::Worst| {
-        let mut cells = vec![Cell::number(drive.drive as f64, 0)];
-        cells.extend(drive.values.iter().map(|value| Cell::Text(short(value))));
-        cells.push(Cell::number(drive.value, decimals(summary.judge)));
+    let judge = heading(summary.judge);
+    let row = |drive: &Worst| {
+        let value = |(name, value): (_, &String)| (name, Cell::Text(short(value)));
         let ended = if drive.diverged { "diverged" } else { "at its end" };
         let left = drive.away.when_and_why().filter(|_| drive.away.is_by_itself());
-        cells.push(Cell::Text(
-            left.map_or(ended.into(), |left| format!("{ended}; guidance ended {left}")),
-        ));
-        cells.push(Cell::Text(format!(
-            "host-sim sweep {file} --replay {}",
-            drive.drive
-        )));
+        let ended = left.map_or(ended.into(), |left| format!("{ended}; guidance ended {left}"));
+        let again = format!("host-sim sweep {file} --replay {}", drive.drive);
+        let mut cells = vec![("Drive", Cell::count(drive.drive))];
+        cells.extend(sweep.columns().zip(&drive.values).map(value));
+        cells.extend([
+            (judge.as_str(), Cell::number(drive.value, decimals(summary.judge))),
+            ("Ended", Cell::Text(ended)),
+            ("Again", Cell::Text(again)),
+        ]);
         cells
     };
-    Table::new(
-        format!("The worst drives by {}", label(summary.judge)),
-        columns,
-        summary.worst.iter().map(row),
-    )
+    let caption = format!("The worst drives by {}", label(summary.judge));
+    Table::of_rows(caption, summary.worst.iter().map(row))
 }
 
 /// Six digits tell drives apart.

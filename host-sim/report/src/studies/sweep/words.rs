@@ -38,12 +38,14 @@ pub(super) fn lower(name: &str) -> String {
 /// What stands for the unit of a field that has a name or a factor of the sweep's own.
 pub(super) const OWN_UNIT: &str = "as in the sweep";
 
+/// How much of a metric's variance a field explains by itself.
+pub(super) fn share(effect: &Effect, metric: &str) -> Option<f64> {
+    effect.shares.iter().find(|(name, _)| *name == metric)?.1
+}
+
 /// The varied fields, that which explains most of the metric that judges first.
 pub(super) fn by_weight(summary: &Summary) -> Vec<&Effect> {
-    let share = |effect: &Effect| {
-        let of_judge = effect.shares.iter().find(|(metric, _)| *metric == summary.judge);
-        of_judge.and_then(|(_, share)| *share).unwrap_or(0.0)
-    };
+    let share = |effect: &Effect| share(effect, summary.judge).unwrap_or(0.0);
     let mut effects: Vec<&Effect> = summary.effects.iter().collect();
     effects.sort_by(|a, b| share(b).total_cmp(&share(a)));
     effects
