@@ -61,9 +61,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let output = arguments.results.begin("faults")?.named("faults.json");
     let world = match &arguments.world {
-        None => World::new(),
+        None => None,
         Some(name) => match WORLDS.iter().find(|kind| kind.name == name) {
-            Some(kind) => World::of_kind(kind),
+            Some(kind) => Some(kind),
             None => {
                 let known: Vec<&str> = WORLDS.iter().map(|kind| kind.name).collect();
                 return Err(BadInput(format!(
@@ -73,6 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             }
         },
     };
+    let world = World::new(world);
     let asked = |drivers: &Drivers| arguments.drivers.as_deref() == Some(drivers.name());
     let world = match Drivers::ALL.into_iter().find(asked) {
         Some(drivers) => world.driven_by(drivers),
