@@ -11,7 +11,7 @@ use haptic_sim::worlds::WORLDS;
 #[test]
 fn every_fault_with_a_few_seeds_breaks_no_rule_and_no_handover_is_worse_than_a_drop() {
     let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
-    let campaign = campaign::run(&World::new(), &here, 1..5, || ());
+    let campaign = campaign::run(&World::new(None), &here, 1..5, || ());
     let failed: Vec<_> = campaign.failures().collect();
     assert!(failed.is_empty(), "{failed:#?}");
     // Four runs of 6.7 to 10.7 s each; a step every millisecond but for the faults of time.
@@ -24,7 +24,7 @@ fn every_fault_with_a_few_seeds_breaks_no_rule_and_no_handover_is_worse_than_a_d
 fn the_vehicle_is_judged_against_its_twin() {
     let by_name = |name: &str| rows().find(|row| row.name == name).expect("a row of the table");
     let campaign = campaign::run(
-        &World::new(),
+        &World::new(None),
         &[by_name("counter-wrap"), by_name("jerk"), by_name("brown-out")],
         1..7,
         || (),
@@ -44,7 +44,7 @@ fn no_rule_breaks_where_roads_and_cars_are_real_and_no_handover_is_worse_than_a_
     let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
     let failures = |name: &str, drivers: Drivers| {
         let world = WORLDS.iter().find(|world| world.name == name).unwrap();
-        let world = World::of_kind(world).driven_by(drivers);
+        let world = World::new(Some(world)).driven_by(drivers);
         campaign::run(&world, &here, 1..2, || ())
             .failures()
             .cloned()
@@ -72,7 +72,7 @@ fn a_vehicle_that_brakes_is_no_fault_and_hides_none() {
         "speed-falls-to-zero",
     ];
     let rows = rows.map(by_name);
-    let campaign = campaign::run(&World::of_kind(world), &rows, 1..9, || ());
+    let campaign = campaign::run(&World::new(Some(world)), &rows, 1..9, || ());
     let left: Vec<u64> = campaign.rows.iter().map(|row| row.left).collect();
     assert_eq!(left, [0, 0, 8, 8, 8]);
     let after_ms = |row: usize| campaign.rows[row].left_after_ms.expect("all left")[1];
@@ -89,7 +89,7 @@ fn contradictions_are_seen() {
     // On a straight an honest lateral error can stay as it is: where there is a curve, it cannot.
     let seen = |name| {
         let row = Box::leak(Box::new(by_name(name).in_a_curve()));
-        let campaign = campaign::run(&World::new(), &[row], 1..11, || ());
+        let campaign = campaign::run(&World::new(None), &[row], 1..11, || ());
         campaign.rows[0].seen
     };
     // A value that freezes is wrong only where the vehicle then moves to the side: in a steady curve half of them do.

@@ -7,7 +7,7 @@ use haptic_campaign::{World, target};
 #[test]
 fn the_image_survives_what_the_host_survives() {
     let marked: Vec<&'static FaultCase> = rows().filter(|row| row.place == Place::Both).collect();
-    let campaign = target::run(&World::new(), &marked, 1..2, || ()).unwrap();
+    let campaign = target::run(&World::new(None), &marked, 1..2, || ()).unwrap();
     let failed: Vec<_> = campaign.failures().collect();
     assert!(failed.is_empty(), "{failed:#?}");
     assert_eq!(campaign.runs, marked.len() as u64);
@@ -17,7 +17,7 @@ fn the_image_survives_what_the_host_survives() {
 #[test]
 fn flipped_bits_of_the_image_stop_it() {
     let row = rows().find(|row| row.name == "flip-state").unwrap();
-    let campaign = target::run(&World::new(), &[row], 1..17, || ()).unwrap();
+    let campaign = target::run(&World::new(None), &[row], 1..17, || ()).unwrap();
     let failed: Vec<_> = campaign.failures().collect();
     assert!(failed.is_empty(), "{failed:#?}");
     let [flips] = &campaign.rows[..] else {

@@ -14,7 +14,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{StudyError, refuse};
-use crate::experiment::{Probe, guided_drive, log_each, recorded, truth_of};
+use crate::experiment::{Probe, compared, guided_drive, log_each, recorded, truth_of};
+use crate::statistics::{mean, rms};
 
 /// The drives, courses and probes to choose from, and the error to reach.
 #[derive(Debug, Clone)]
@@ -56,6 +57,9 @@ pub struct Design {
     pub needed_s: Option<f64>,
     /// Drives in which the ECU ended guidance by itself: from then on they tell what a drive without guidance does.
     pub left_by_itself: usize,
+    /// Its probes, of which each has an equal part of the drive.
+    #[serde(skip)]
+    probes: Vec<Option<Probe>>,
 }
 
 /// The best design, tried.
@@ -150,50 +154,15 @@ pub fn design(request: &DesignRequest, done: impl Fn() + Sync) -> Result<DesignR
     let drivers = drivers(&request.participants)?;
     let probes = probes(request);
     let cells = cells(request, &drivers, &probes, &done)?;
+    let forms = forms(request, &probes);
     let mut designs = Vec::new();
     for (course, road) in request.courses.iter().enumerate() {
-        let of = |probe: Option<Probe>| -> Vec<&Information> {
-            let here = cells.iter().filter(|c| c.course == course && c.probe == probe);
-            here.map(|c| &c.information).collect()
-        };
-        let left = |probes: &[Option<Probe>]| {
-            let here = cells
+        let here: Vec<&Cell> = cells.iter().filter(|c| c.course == course).collect();
+        designs.extend(
+            forms
                 .iter()
-                .filter(|c| c.course == course && probes.contains(&c.probe));
-            here.filter(|c| c.left_by_itself).count()
-        };
-        for &probe in &probes {
-            let all: Vec<Information> = of(probe).into_iter().cloned().collect();
-            let frequencies = probe.map(|p| p.frequency_hz).into_iter().collect();
-            designs.push(Design {
-                left_by_itself: left(&[probe]),
-                ..Design::new(request, place, road, probe, frequencies, &all)
-            });
-        }
-        // The slowest and the fastest of each amplitude, half the drive each.
-        for &amplitude_nm in &request.amplitudes_nm {
-            let same: Vec<Probe> = probes
-                .iter()
-                .flatten()
-                .filter(|p| p.amplitude_nm == amplitude_nm)
-                .copied()
-                .collect();
-            let (Some(&slow), Some(&fast)) = (same.first(), same.last()) else {
-                continue;
-            };
-            if slow == fast {
-                continue;
-            }
-            let halves = of(Some(slow)).into_iter().zip(of(Some(fast)));
-            let all: Vec<Information> = halves
-                .map(|(a, b)| a.lasting(0.5 * a.span_s).and(&b.lasting(0.5 * b.span_s)))
-                .collect();
-            let frequencies = vec![slow.frequency_hz, fast.frequency_hz];
-            designs.push(Design {
-                left_by_itself: left(&[Some(slow), Some(fast)]),
-                ..Design::new(request, place, road, Some(slow), frequencies, &all)
-            });
-        }
+                .map(|form| Design::new(request, place, road, form, &here)),
+        );
     }
     let length = |d: &Design| d.needed_s.unwrap_or(f64::INFINITY);
     let best = (0..designs.len())
@@ -242,44 +211,57 @@ fn probes(request: &DesignRequest) -> Vec<Option<Probe>> {
     out
 }
 
+/// Each probe alone, then of each amplitude the slowest and the fastest, which share the drive.
+fn forms(request: &DesignRequest, probes: &[Option<Probe>]) -> Vec<Vec<Option<Probe>>> {
+    let mut forms: Vec<Vec<Option<Probe>>> = probes.iter().map(|probe| vec![*probe]).collect();
+    for amplitude_nm in &request.amplitudes_nm {
+        let mut same = probes
+            .iter()
+            .filter(|probe| probe.is_some_and(|p| p.amplitude_nm == *amplitude_nm));
+        if let (Some(slow), Some(fast)) = (same.next(), same.next_back())
+            && slow != fast
+        {
+            forms.push(vec![*slow, *fast]);
+        }
+    }
+    forms
+}
+
 impl Design {
+    /// A form on a course, of what the drives there tell.
     fn new(
         request: &DesignRequest,
         place: usize,
         course: &Course,
-        probe: Option<Probe>,
-        frequencies_hz: Vec<f64>,
-        all: &[Information],
+        form: &[Option<Probe>],
+        here: &[&Cell],
     ) -> Self {
+        // Each driver drives each part of the form.
+        let parts: Vec<Vec<&Cell>> = form
+            .iter()
+            .map(|probe| here.iter().copied().filter(|c| c.probe == *probe).collect())
+            .collect();
+        let share = 1.0 / form.len() as f64;
+        let of_driver = |driver: usize| {
+            let parts = parts.iter().map(|part| &part[driver].information);
+            let parts = parts.map(|part| part.lasting(share * part.span_s));
+            parts.reduce(|before, part| before.and(&part))
+        };
+        let all: Vec<Information> = (0..parts[0].len()).filter_map(of_driver).collect();
         let errors: Vec<[f64; 6]> = all
             .iter()
             .map(|i| i.standard_errors(request.t_nms_known))
             .collect();
-        let rms = |i: usize| (errors.iter().map(|e| e[i] * e[i]).sum::<f64>() / errors.len() as f64).sqrt();
-        let span_s = all.iter().map(|i| i.span_s).sum::<f64>() / all.len() as f64;
         Self {
             course: course.name().into(),
-            amplitude_nm: probe.map_or(0.0, |p| p.amplitude_nm),
-            frequencies_hz,
-            span_s,
-            standard_errors: std::array::from_fn(rms),
-            needed_s: needed(request, place, all),
-            left_by_itself: 0,
+            amplitude_nm: form[0].map_or(0.0, |p| p.amplitude_nm),
+            frequencies_hz: form.iter().flatten().map(|p| p.frequency_hz).collect(),
+            span_s: mean(all.iter().map(|i| i.span_s)).unwrap_or(f64::NAN),
+            standard_errors: std::array::from_fn(|i| rms(errors.iter().map(|e| e[i])).unwrap_or(f64::NAN)),
+            needed_s: needed(request, place, &all),
+            left_by_itself: parts.iter().flatten().filter(|c| c.left_by_itself).count(),
+            probes: form.to_vec(),
         }
-    }
-
-    /// The standard errors of a drive of another length, over the participants' information.
-    fn probes(&self) -> Vec<Option<Probe>> {
-        if self.frequencies_hz.is_empty() {
-            return vec![None];
-        }
-        let of = |&frequency_hz: &f64| {
-            Some(Probe {
-                amplitude_nm: self.amplitude_nm,
-                frequency_hz,
-            })
-        };
-        self.frequencies_hz.iter().map(of).collect()
     }
 }
 
@@ -287,11 +269,9 @@ impl Design {
 /// beforehand does not grow with the drive.
 fn needed(request: &DesignRequest, place: usize, all: &[Information]) -> Option<f64> {
     let error = |span_s: f64| {
-        let squares = all.iter().map(|i| {
-            let lasting = i.lasting(span_s);
-            lasting.standard_errors(request.t_nms_known)[place].powi(2)
-        });
-        (squares.sum::<f64>() / all.len() as f64).sqrt()
+        let lasting = all.iter().map(|i| i.lasting(span_s));
+        let errors = lasting.map(|i| i.standard_errors(request.t_nms_known)[place]);
+        rms(errors).unwrap_or(f64::NAN)
     };
     let (mut low, mut high) = (1.0, 1e6);
     if error(high).is_nan() || error(high) > request.error {
@@ -318,7 +298,6 @@ fn confirm(
 ) -> Result<Confirmation, StudyError> {
     let course = request.courses.iter().find(|c| c.name() == design.course);
     let length_s = design.needed_s.unwrap_or(design.span_s).max(SHORTEST_S);
-    let probes = design.probes();
     let jobs: Vec<(u32, PublishedDriver, u64)> = drivers
         .iter()
         .flat_map(|&(number, driver)| (0..u64::from(request.confirmations)).map(move |r| (number, driver, r)))
@@ -331,9 +310,9 @@ fn confirm(
         .into_par_iter()
         .map(|(number, driver, repetition)| {
             let mut logs = Vec::new();
-            let each_s = length_s / probes.len() as f64;
+            let each_s = length_s / design.probes.len() as f64;
             let mut predicted: Option<Information> = None;
-            for (half, &probe) in probes.iter().enumerate() {
+            for (half, &probe) in design.probes.iter().enumerate() {
                 let mut left_s = each_s;
                 let mut turn = 0;
                 while left_s > 0.0 && turn < 100 {
@@ -357,15 +336,10 @@ fn confirm(
             }
             let fit = identify_together(&logs, &options)?;
             done();
-            let (_, _, p) = fit.parameters.list()[place_in_list(place)];
-            let truth = truth_of(&driver);
-            let truth = [
-                truth.gain[0],
-                truth.gain[1],
-                truth.gain[2],
-                truth.k_hg,
-                truth.t_p_s,
-            ][place];
+            let all = compared(&driver, &fit.parameters);
+            let Some((_, p, truth)) = all.into_iter().find(|(key, ..)| *key == request.parameter) else {
+                unreachable!("each parameter of a design is compared")
+            };
             let promised = predicted.map_or(f64::NAN, |p| p.standard_errors(request.t_nms_known)[place]);
             let off = p.optimum.map_or(f64::NAN, |x| x - truth);
             let held = p
@@ -375,25 +349,13 @@ fn confirm(
         })
         .collect::<Result<Vec<_>, StudyError>>()?;
     let count = found.len() as f64;
-    let rms = |f: &dyn Fn(&(f64, bool, f64)) -> f64| {
-        (found.iter().map(|x| f(x).powi(2)).sum::<f64>() / count).sqrt()
-    };
     Ok(Confirmation {
         fits: found.len(),
         length_s,
-        predicted: rms(&|x| x.2),
-        rms: rms(&|x| x.0),
+        predicted: rms(found.iter().map(|x| x.2)).unwrap_or(f64::NAN),
+        rms: rms(found.iter().map(|x| x.0)).unwrap_or(f64::NAN),
         coverage: found.iter().filter(|x| x.1).count() as f64 / count,
     })
-}
-
-/// The list of parameters has t_p before k_hg.
-fn place_in_list(place: usize) -> usize {
-    match place {
-        3 => 4,
-        4 => 3,
-        other => other,
-    }
 }
 
 /// The beginning of a log.

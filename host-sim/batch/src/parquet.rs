@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
+use std::mem::take;
 use std::sync::Arc;
 
 use parquet::basic::{Compression, ConvertedType, Repetition, Type as Kind};
@@ -11,19 +12,14 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
+use crate::entries::{Entry, EntryKind};
+use crate::sweep::value;
+
 /// Rows in memory at once.
 const ROWS_OF_A_GROUP: usize = 65_536;
 
-/// A value of a row.
-pub(crate) enum Cell {
-    Whole(u64),
-    Number(Option<f64>),
-    Text(String),
-    Flag(bool),
-}
-
 /// A column's values on their way.
-pub(crate) enum ParquetColumn {
+enum ParquetColumn {
     Whole(Vec<i64>),
     Number(Vec<Option<f64>>),
     Text(Vec<String>),
@@ -40,11 +36,14 @@ pub(crate) struct Table {
 impl Table {
     /// With its columns, empty, and with what the file's metadata say.
     pub(crate) fn create(
-        columns: impl IntoIterator<Item = (String, ParquetColumn)>,
+        columns: impl IntoIterator<Item = (String, EntryKind)>,
         metadata: &[(&str, &str)],
         file: File,
     ) -> io::Result<Self> {
-        let (names, columns): (Vec<String>, Vec<ParquetColumn>) = columns.into_iter().unzip();
+        let columns = columns
+            .into_iter()
+            .map(|(name, kind)| (name, ParquetColumn::new(kind)));
+        let (names, columns): (Vec<String>, Vec<ParquetColumn>) = columns.unzip();
         let fields = names
             .iter()
             .zip(&columns)
@@ -69,10 +68,10 @@ impl Table {
         })
     }
 
-    /// A row, with a cell of its kind for each column.
-    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) -> io::Result<()> {
-        for (column, cell) in self.columns.iter_mut().zip(cells) {
-            column.push(cell);
+    /// A row, with a entry of its kind for each column.
+    pub(crate) fn row<'a>(&mut self, entries: impl IntoIterator<Item = Entry<'a>>) -> io::Result<()> {
+        for (column, entry) in self.columns.iter_mut().zip(entries) {
+            column.push(entry);
         }
         self.rows += 1;
         if self.rows == ROWS_OF_A_GROUP {
@@ -102,6 +101,15 @@ impl Table {
 }
 
 impl ParquetColumn {
+    fn new(kind: EntryKind) -> Self {
+        match kind {
+            EntryKind::Whole => Self::Whole(Vec::new()),
+            EntryKind::Number => Self::Number(Vec::new()),
+            EntryKind::Text => Self::Text(Vec::new()),
+            EntryKind::Flag => Self::Flag(Vec::new()),
+        }
+    }
+
     fn field(&self, name: &str) -> io::Result<Arc<Type>> {
         let (kind, repetition) = match self {
             Self::Whole(_) => (Kind::INT64, Repetition::REQUIRED),
@@ -118,12 +126,14 @@ impl ParquetColumn {
         builder.build().map(Arc::new).map_err(other)
     }
 
-    fn push(&mut self, cell: Cell) {
-        match (self, cell) {
-            (Self::Whole(values), Cell::Whole(value)) => values.push(value as i64),
-            (Self::Number(values), Cell::Number(value)) => values.push(value),
-            (Self::Text(values), Cell::Text(value)) => values.push(value),
-            (Self::Flag(values), Cell::Flag(value)) => values.push(value),
+    fn push(&mut self, entry: Entry<'_>) {
+        match (self, entry) {
+            (Self::Whole(values), Entry::Whole(value)) => values.push(value as i64),
+            (Self::Number(values), Entry::Number(value)) => values.push(value),
+            (Self::Text(values), Entry::Text(value)) => values.push(value),
+            (Self::Flag(values), Entry::Flag(value)) => values.push(value),
+            (Self::Number(values), Entry::Value(value)) => values.push(value::number(value)),
+            (Self::Text(values), Entry::Value(value)) => values.push(value::text(value)),
             // The group would not close: its columns differ in length.
             _ => {}
         }
@@ -134,40 +144,24 @@ impl ParquetColumn {
         let Some(mut column) = group.next_column().map_err(other)? else {
             return Err(io::Error::other("more columns than the schema has"));
         };
-        match self {
-            Self::Whole(values) => {
-                column
-                    .typed::<Int64Type>()
-                    .write_batch(values, None, None)
-                    .map_err(other)?;
-                values.clear();
-            }
+        let written = match self {
+            Self::Whole(values) => column.typed::<Int64Type>().write_batch(&take(values), None, None),
             Self::Number(values) => {
+                let values = take(values);
                 let levels: Vec<i16> = values.iter().map(|value| i16::from(value.is_some())).collect();
-                let there: Vec<f64> = values.iter().copied().flatten().collect();
+                let there: Vec<f64> = values.into_iter().flatten().collect();
                 column
                     .typed::<DoubleType>()
                     .write_batch(&there, Some(&levels), None)
-                    .map_err(other)?;
-                values.clear();
             }
             Self::Text(values) => {
-                let bytes: Vec<ByteArray> =
-                    values.iter().map(|text| ByteArray::from(text.as_str())).collect();
-                column
-                    .typed::<ByteArrayType>()
-                    .write_batch(&bytes, None, None)
-                    .map_err(other)?;
-                values.clear();
+                let texts = take(values).into_iter();
+                let bytes: Vec<ByteArray> = texts.map(|text| text.into_bytes().into()).collect();
+                column.typed::<ByteArrayType>().write_batch(&bytes, None, None)
             }
-            Self::Flag(values) => {
-                column
-                    .typed::<BoolType>()
-                    .write_batch(values, None, None)
-                    .map_err(other)?;
-                values.clear();
-            }
-        }
+            Self::Flag(values) => column.typed::<BoolType>().write_batch(&take(values), None, None),
+        };
+        written.map_err(other)?;
         column.close().map_err(other)
     }
 }

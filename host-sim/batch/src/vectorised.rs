@@ -110,6 +110,26 @@ impl Group<'_> {
         });
         result.map(|()| rejected)
     }
+
+    /// What `measure` makes of each run that is driven side by side; nothing of those that are rejected.
+    ///
+    /// # Errors
+    /// As [`Self::run_batch`], with what `measure` says.
+    pub(crate) fn measured<T>(
+        &self,
+        options: Options,
+        alone: impl Fn(usize) -> Run,
+        mut measure: impl FnMut(usize, &Run) -> Result<T, StudyError>,
+    ) -> Result<Vec<Option<T>>, StudyError> {
+        let mut found: Vec<Option<T>> = self.scenarios.iter().map(|_| None).collect();
+        self.run_batch(options, alone, |place, event| {
+            if let Event::Ended(run) = event {
+                found[place] = Some(measure(place, run)?);
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    }
 }
 
 /// Whether two runs are the same to the last bit, signs of zeros included.
@@ -174,20 +194,15 @@ pub(crate) fn run_batched<T: Send>(
 ) -> Result<Vec<Option<T>>, StudyError> {
     let checked = Checked::new(seed, scenarios.len() as u64);
     in_groups(scenarios, |first, scenarios| {
-        let mut found: Vec<Option<T>> = scenarios.iter().map(|_| None).collect();
         let group = Group {
             scenarios,
             first: first as u64,
             checked,
         };
         let alone = |place: usize| simulate(&scenarios[place]);
-        group.run_batch(Options::default(), alone, |place, event| {
-            if let Event::Ended(run) = event {
-                found[place] = Some(measure(first + place, run)?);
-            }
-            Ok(())
-        })?;
-        Ok(found)
+        group.measured(Options::default(), alone, |place, run| {
+            measure(first + place, run)
+        })
     })
 }
 

@@ -153,43 +153,24 @@ impl<'a> EcuHarness<'a> {
     }
 
     fn send(&mut self, observation: &Observation) {
-        let (step, acts) = (observation.step, self.timing.acts(observation.step));
-        let since_s = acts.then(|| self.timing.since(step) as f64 * 1e-3);
-        let readings = self
-            .senders
-            .read(observation, self.row.injections, since_s, &mut self.rng);
-        let [commanded_nm, delivered_nm] = [self.commanded_nm, self.delivered_nm];
-        let has_probe = self.senders.has_probe();
-        self.witness.readings(
-            observation.step,
-            &readings,
-            [commanded_nm, delivered_nm],
-            has_probe,
-        );
+        let step = observation.step;
+        let (acting, since_s) = (self.timing.acting(step), self.timing.since(step) as f64 * 1e-3);
+        let readings = self.senders.read(observation, acting, since_s, &mut self.rng);
+        let torques_nm = [self.commanded_nm, self.delivered_nm];
+        self.witness
+            .readings(step, &readings, torques_nm, self.senders.probe);
         self.sent.clear();
         let requested = is_engaged(self.row.start) || step >= self.timing.onset;
-        self.senders.send(
-            observation,
-            &readings,
-            requested,
-            self.row.injections,
-            acts,
-            &mut self.sent,
-        );
-        if let Some(times) = Bus::burst(self.row.injections, acts) {
+        self.senders
+            .send(observation, &readings, requested, acting, &mut self.sent);
+        if let Some(times) = Bus::burst(acting) {
             for frame in &self.sent {
                 self.senders.skip_counts(frame.id(), times - 1);
             }
         }
-        self.bus.carry(
-            step,
-            &self.sent,
-            self.row.injections,
-            acts,
-            &mut self.rng,
-            &mut self.arrivals,
-        );
-        if acts && self.timing.has(Injection::Inside(Inside::ReceiverSkipped)) {
+        self.bus
+            .carry(step, &self.sent, acting, &mut self.rng, &mut self.arrivals);
+        if acting.contains(&Injection::Inside(Inside::ReceiverSkipped)) {
             self.arrivals.clear();
         }
     }

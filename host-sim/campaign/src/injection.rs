@@ -6,6 +6,17 @@
 
 use haptic_core::ecu::injection::Region;
 
+/// What the first injection of a kind says, if there is one.
+macro_rules! first_of {
+    ($injections:expr, $kind:pat => $says:expr) => {
+        $injections.iter().find_map(|injection| match injection {
+            $kind => Some($says),
+            _ => None,
+        })
+    };
+}
+pub(super) use first_of;
+
 /// A value that a sensor gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Signal {

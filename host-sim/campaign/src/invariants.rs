@@ -93,14 +93,14 @@ struct Last {
 }
 
 /// Start of a fade or a handover: its largest torque, and how far along it is.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Ramp {
     from_nm: f64,
     passed_s: f64,
 }
 
 /// Judges one ECU.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct InvariantChecker {
     last: Option<Last>,
     /// Whether the ECU may be Active from its first cycle on.
@@ -129,23 +129,11 @@ impl InvariantChecker {
     /// For an ECU that starts at `now_us` of its clock, in Boot or, in studies, Active.
     pub(super) fn new(starts_active: bool, camera_lags: bool, now_us: u32) -> Self {
         Self {
-            last: None,
             starts_active,
-            true_at_us: [None; 4],
             camera_lags,
             camera_is_late: camera_lags,
-            driver_nm: 0.0,
-            request: None,
-            rose: false,
             standby_since_us: now_us,
-            ramp: Ramp {
-                from_nm: 0.0,
-                passed_s: 0.0,
-            },
-            window: VecDeque::new(),
-            outputs: VecDeque::new(),
-            cycles: 0,
-            violation: None,
+            ..Self::default()
         }
     }
 

@@ -15,7 +15,7 @@
 //! use haptic_campaign::{World, table};
 //!
 //! let frozen = table::rows().find(|row| row.name == "lateral-error-frozen").unwrap();
-//! let outcome = World::new().run(frozen, 6);
+//! let outcome = World::new(None).run(frozen, 6);
 //! let said: Vec<_> = outcome.reported.iter().map(|event| event.what.as_str()).collect();
 //! assert_eq!(said[..2], ["The ECU reports LaneImplausible", "The ECU goes to Handover"]);
 //! ```

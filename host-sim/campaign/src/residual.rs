@@ -117,7 +117,7 @@ impl Detectability {
 }
 
 /// The checks' sums and last values.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Residual {
     vehicle: SteadyCornering,
     damping_nm_s: f64,
@@ -156,25 +156,8 @@ impl Residual {
             vehicle: vehicle.steady_cornering(),
             damping_nm_s: vehicle.b_s,
             speeds_m_per_s: [v_m_per_s; 2],
-            yaw_rate_rad_per_s: 0.0,
-            wheel_rad: 0.0,
-            wheel_rate_rad_per_s: 0.0,
-            lane: None,
-            headings: VecDeque::new(),
-            lines: VecDeque::new(),
-            lane_bias_m_per_s: 0.0,
-            column_bias_nm: 0.0,
-            predicted_m: 0.0,
-            moved_m: 0.0,
-            now_s: 0.0,
-            column_at_s: None,
             still: (f64::NAN, 0.0, [0.0; 2]),
-            momentum_nm_s: 0.0,
-            commands_nm: [0.0; MOTOR_ECHO],
-            motor_band_nm: [0.0; 2],
-            motor_nm: 0.0,
-            off: 0,
-            astray: 0,
+            ..Self::default()
         }
     }
 

@@ -10,7 +10,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::bytes::MESSAGES;
-use super::injection::{Change, Injection, RequestFault, Signal};
+use super::injection::{Change, Injection, RequestFault, Signal, first_of};
 use haptic_sim::guidance::Observation;
 use haptic_sim::models::sensors;
 
@@ -32,7 +32,7 @@ pub(super) struct SensorReadings {
 }
 
 /// The senders with their counters, and the values that a fault remembers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Senders {
     counters: [u8; MESSAGES.len()],
     /// By signal: the value at the onset.
@@ -40,39 +40,30 @@ pub(super) struct Senders {
     toggled: bool,
     requests: u32,
     /// Whether the host wants the probe as well.
-    probe: bool,
+    pub(super) probe: bool,
     /// What the column's model takes for the aligning torque, N.m.s2/m.
     aligning_gain_nm_s2_per_m: f64,
 }
 
 impl Senders {
-    /// Whether the host wants the probe.
-    pub(super) fn has_probe(&self) -> bool {
-        self.probe
-    }
-
     pub(super) fn new(probe: bool, aligning_gain_nm_s2_per_m: f64) -> Self {
         Self {
             aligning_gain_nm_s2_per_m,
-            counters: [0; MESSAGES.len()],
-            held: [None; Signal::COUNT],
-            toggled: false,
-            requests: 0,
             probe,
+            ..Self::default()
         }
     }
 
-    /// What is read in this step, with what is wrong with it; `since_s` the onset if the injections act.
+    /// What is read in this step, with what is wrong with it `since_s` the onset.
     pub(super) fn read(
         &mut self,
         observation: &Observation,
-        injections: &[Injection],
-        since_s: Option<f64>,
+        acting: &[Injection],
+        since_s: f64,
         noise: &mut Xoshiro256PlusPlus,
     ) -> SensorReadings {
         let mut read = |signal: Signal, truth: f64| {
-            let Some(since_s) = since_s else { return truth };
-            let changes = injections.iter().filter_map(|injection| match injection {
+            let changes = acting.iter().filter_map(|injection| match injection {
                 Injection::Sensor(of, change) if *of == signal => Some(change),
                 _ => None,
             });
@@ -117,13 +108,13 @@ impl Senders {
         });
         let honest = SensorReadings {
             lane,
-            lane_valid: since_s.is_none() || !injections.contains(&Injection::Invalid),
+            lane_valid: !acting.contains(&Injection::Invalid),
             column,
             motor_torque_nm,
             speeds_m_per_s,
             yaw_rate_rad_per_s,
         };
-        self.falsify(honest, observation, injections, since_s)
+        self.falsify(honest, observation, acting, since_s)
     }
 
     /// What a node that knows the checks makes of the readings, if there is one.
@@ -131,14 +122,12 @@ impl Senders {
         &mut self,
         honest: SensorReadings,
         observation: &Observation,
-        injections: &[Injection],
-        since_s: Option<f64>,
+        acting: &[Injection],
+        since_s: f64,
     ) -> SensorReadings {
-        let false_lane = injections.iter().find_map(|injection| match injection {
-            Injection::FalseLane { to_m, ms, hides_hand } => Some((*to_m, *ms, *hides_hand)),
-            _ => None,
-        });
-        let (Some((to_m, ms, hides_hand)), Some(since_s)) = (false_lane, since_s) else {
+        let false_lane =
+            first_of!(acting, Injection::FalseLane { to_m, ms, hides_hand } => (*to_m, *ms, *hides_hand));
+        let Some((to_m, ms, hides_hand)) = false_lane else {
             return honest;
         };
         let yaw_rate = observation.yaw_rate_rad_per_s.unwrap_or(0.0);
@@ -160,12 +149,10 @@ impl Senders {
     }
 
     /// Whether guidance is wanted in the command of this step; `high` without a fault.
-    fn requests_guidance(&mut self, high: bool, injections: &[Injection], acts: bool) -> bool {
-        let fault = injections.iter().find_map(|injection| match injection {
-            Injection::Request(fault) if acts => Some(*fault),
-            _ => None,
-        });
-        let Some(fault) = fault else { return high };
+    fn requests_guidance(&mut self, high: bool, acting: &[Injection]) -> bool {
+        let Some(fault) = first_of!(acting, Injection::Request(fault) => *fault) else {
+            return high;
+        };
         self.toggled = !self.toggled;
         self.requests += 1;
         match fault {
@@ -181,8 +168,7 @@ impl Senders {
         observation: &Observation,
         readings: &SensorReadings,
         requested: bool,
-        injections: &[Injection],
-        acts: bool,
+        acting: &[Injection],
         frames: &mut Vec<Frame>,
     ) {
         let mut count = |sender: usize| {
@@ -217,7 +203,7 @@ impl Senders {
         if observation.step.is_multiple_of(HOST_PERIOD_MS) {
             let counter = count(3);
             let message = Request {
-                engage: self.requests_guidance(requested, injections, acts),
+                engage: self.requests_guidance(requested, acting),
                 authority: Ratio::ONE,
                 probe: self.probe,
             };

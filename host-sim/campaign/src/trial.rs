@@ -115,16 +115,6 @@ pub struct TrialOutcome {
 }
 
 impl World {
-    /// Everyone who drives and every road, in the paper's world.
-    pub fn new() -> Self {
-        Self::new_with(None)
-    }
-
-    /// A world beyond the paper's, such as one with friction, wind or braking, with drivers who keep the lane in such a car.
-    pub fn of_kind(kind: &'static WorldKind) -> Self {
-        Self::new_with(Some(kind)).driven_by(Drivers::Population)
-    }
-
     /// The same with other drivers.
     pub fn driven_by(mut self, drivers: Drivers) -> Self {
         self.driven_by = drivers;
@@ -149,7 +139,6 @@ impl World {
 
     /// What a command needs beside row and seed to run a trial of this world again.
     pub(crate) fn arguments(&self) -> String {
-        let usual = self.kind.map_or(Drivers::Paper, |_| Drivers::Population);
         let world = self
             .kind
             .map_or(String::new(), |kind| format!(" --world {}", kind.name));
@@ -157,14 +146,16 @@ impl World {
             0 => String::new(),
             _ => format!(" --law {}", self.law()),
         };
-        if self.driven_by == usual {
+        if self.driven_by == usual(self.kind) {
             format!("{world}{law}")
         } else {
             format!("{world} --drivers {}{law}", self.driven_by.name())
         }
     }
 
-    fn new_with(kind: Option<&'static WorldKind>) -> Self {
+    /// Everyone who drives and every road: in the paper's world if there is no `kind`, else in one beyond it, such as one with friction,
+    /// wind or braking, with drivers who keep the lane in such a car.
+    pub fn new(kind: Option<&'static WorldKind>) -> Self {
         let surface = kind.map_or(Surface::FLAT, WorldKind::surface);
         let run_ms = LATEST_ONSET_MS + BEHIND_MS + AFTER_MS;
         let at = |kmh| PLACES.map(|place| roads::curve(kmh, place, run_ms, surface));
@@ -183,7 +174,7 @@ impl World {
             roads: SPEEDS_KMH.map(at).into(),
             turning_road: roads::turning(AFTER_MS, surface),
             kind,
-            driven_by: Drivers::Paper,
+            driven_by: usual(kind),
             law: 0,
         }
     }
@@ -419,10 +410,9 @@ fn able(drivers: &[Driver], kmh: f64) -> Vec<usize> {
     (0..drivers.len()).filter(|n| settles(&drivers[*n])).collect()
 }
 
-impl Default for World {
-    fn default() -> Self {
-        Self::new()
-    }
+/// Who drives if nobody asks for others.
+fn usual(kind: Option<&'static WorldKind>) -> Drivers {
+    kind.map_or(Drivers::Paper, |_| Drivers::Population)
 }
 
 #[cfg(test)]

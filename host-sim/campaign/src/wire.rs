@@ -10,7 +10,7 @@ use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use super::bytes::{self, LANE, MESSAGES};
-use super::injection::{Injection, Wire};
+use super::injection::{Injection, Wire, first_of};
 
 /// A frame at the ECU's door.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +21,7 @@ pub(super) struct Arrival {
 }
 
 /// What the bus remembers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Bus {
     /// Everything sent, by step, as long as a replay may need it.
     log: VecDeque<Vec<Frame>>,
@@ -40,27 +40,16 @@ pub(super) struct Bus {
 
 impl Bus {
     pub(super) fn new(injections: &[Injection]) -> Self {
-        let log_length = injections.iter().find_map(|injection| match injection {
-            Injection::Wire(Wire::Replayed(_, ms)) => Some(*ms),
-            _ => None,
-        });
+        let log_length = first_of!(injections, Injection::Wire(Wire::Replayed(_, ms)) => *ms);
         Self {
-            log: VecDeque::new(),
             log_length: log_length.unwrap_or(0),
-            since_onset: [0; MESSAGES.len()],
-            counters: [None; MESSAGES.len()],
-            waiting: [None; MESSAGES.len()],
-            late: VecDeque::new(),
-            last_due: [0; MESSAGES.len()],
+            ..Self::default()
         }
     }
 
     /// How often the senders have to send in this step, where it is not once.
-    pub(super) fn burst(injections: &[Injection], acts: bool) -> Option<u8> {
-        injections.iter().find_map(|injection| match injection {
-            Injection::Wire(Wire::Burst(times)) if acts => Some(*times),
-            _ => None,
-        })
+    pub(super) fn burst(acting: &[Injection]) -> Option<u8> {
+        first_of!(acting, Injection::Wire(Wire::Burst(times)) => *times)
     }
 
     /// Takes what is sent in a step, appends what arrives.
@@ -68,8 +57,7 @@ impl Bus {
         &mut self,
         step: u32,
         sent: &[Frame],
-        injections: &[Injection],
-        acts: bool,
+        acting: &[Injection],
         rng: &mut Xoshiro256PlusPlus,
         arrivals: &mut Vec<Arrival>,
     ) {
@@ -79,10 +67,7 @@ impl Bus {
         let replayed = (self.log.len() > self.log_length)
             .then(|| self.log.pop_front())
             .flatten();
-        let wire = injections.iter().find_map(|injection| match injection {
-            Injection::Wire(wire) if acts => Some(*wire),
-            _ => None,
-        });
+        let wire = first_of!(acting, Injection::Wire(wire) => *wire);
         if let Some(Wire::Replayed(ids, _)) = wire {
             let of_these = |frame: &&Frame| ids.contains(&frame.id());
             let frames = replayed.unwrap_or_default();

@@ -144,7 +144,7 @@ fn detection(plan: &AvailabilityPlan, seeds: u64) -> Option<Detection> {
     let world = named.or(plan.worlds.last()).filter(|_| seeds > 0)?;
     let rows: Vec<&'static FaultCase> = table::rows().filter(|row| row.place != Place::Target).collect();
     let campaign = progress::over(rows.len() as u64 * seeds, "faults", |done| {
-        campaign::run(&World::of_kind(world), &rows, 1..seeds + 1, done)
+        campaign::run(&World::new(Some(world)), &rows, 1..seeds + 1, done)
     });
     Some(Detection {
         world: world.name,

@@ -62,12 +62,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let output = arguments.results.begin("faults")?.named("faults.json");
     let world = match &arguments.world {
-        None => World::new(),
+        None => None,
         Some(name) => {
             let names = std::slice::from_ref(name);
-            World::of_kind(chosen("--world", names, &WORLDS, |kind| kind.name)?[0])
+            Some(chosen("--world", names, &WORLDS, |kind| kind.name)?[0])
         }
     };
+    let world = World::new(world);
     let asked = |drivers: &Drivers| arguments.drivers.as_deref() == Some(drivers.name());
     let world = match Drivers::ALL.into_iter().find(asked) {
         Some(drivers) => world.driven_by(drivers),

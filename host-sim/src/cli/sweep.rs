@@ -59,11 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     output::check(out, "sweep", kept(out))?;
     let store = Store::open(&sweep, VERSION, out)?;
     output::keeps(out, "chunk")?;
-    let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let threads = arguments
-        .threads
-        .threads
-        .map_or_else(all, |threads| threads as usize);
+    let threads = arguments.threads.threads;
     let bar = Bar::new();
     run_all(&store, &sweep, arguments.shard, threads, |progress| {
         bar.show(progress)

@@ -4,6 +4,7 @@ use haptic_core::controller::config::LEAST_BAND_NM;
 use haptic_core::safety::monitor::{ASTRAY_MS, RATE_SPAN_US};
 
 use super::counts::{flag, truncated};
+use super::lanes::lanes;
 use super::rejected::Reason;
 
 /// Who decides the torque.
@@ -16,44 +17,32 @@ const BAND_MNM: f64 = LEAST_BAND_NM * 1e3;
 /// The monitor takes rates over at least this, ms.
 const RATE_SPAN_MS: i32 = RATE_SPAN_US / 1000;
 
-/// What the monitor compares the torque with.
-#[repr(C, align(64))]
-pub(super) struct Band<const N: usize> {
-    /// mN.m per m, per rad, per m/s, per rad/s; the last is what its coarse arithmetic may be off by, mN.m.
-    gains: [[f64; N]; 4],
-    half: [f64; N],
-    before: [[f64; N]; 2],
-    last: [[f64; N]; 2],
-    before_ms: [i32; N],
-    last_ms: [i32; N],
-    low: [i32; N],
-    high: [i32; N],
-    torque: [i32; N],
-    astray: [i32; N],
+lanes! {
+    /// What the monitor compares the torque with.
+    pub(super) struct Band {
+        half: f64 = 0.0,
+        before_ms: i32 = 0,
+        last_ms: i32 = 0,
+        low: i32 = 0,
+        high: i32 = 0,
+        torque: i32 = 0,
+        astray: i32 = 0,
+    } beside {
+        /// mN.m per m, per rad, per m/s, per rad/s; the last is what its coarse arithmetic may be off by, mN.m.
+        gains: [[f64; N]; 4] = [[0.0; N]; 4],
+        before: [[f64; N]; 2] = [[0.0; N]; 2],
+        last: [[f64; N]; 2] = [[0.0; N]; 2],
+    }
 }
 
 impl<const N: usize> Band<N> {
-    pub(super) fn new() -> Self {
-        Self {
-            gains: [[0.0; N]; 4],
-            half: [0.0; N],
-            before: [[0.0; N]; 2],
-            last: [[0.0; N]; 2],
-            before_ms: [0; N],
-            last_ms: [0; N],
-            low: [0; N],
-            high: [0; N],
-            torque: [0; N],
-            astray: [0; N],
-        }
-    }
-
     pub(super) fn begin(
         &mut self,
         lane: usize,
         [on_e_y, on_e_y_rate, on_e_theta, on_e_theta_rate]: [f64; 4],
         probe_nm: f64,
     ) {
+        self.clear(lane);
         let gains = [on_e_y, on_e_theta, on_e_y_rate, on_e_theta_rate].map(|gain| gain * 1e3);
         for (all, gain) in self.gains.iter_mut().zip(gains) {
             all[lane] = gain;
@@ -65,16 +54,6 @@ impl<const N: usize> Band<N> {
         self.half[lane] = BAND_MNM - coarse + probe_nm * 1e3;
         for errors in self.before.iter_mut().chain(&mut self.last) {
             errors[lane] = 0.0;
-        }
-        for state in [
-            &mut self.before_ms,
-            &mut self.last_ms,
-            &mut self.low,
-            &mut self.high,
-            &mut self.torque,
-            &mut self.astray,
-        ] {
-            state[lane] = 0;
         }
     }
 

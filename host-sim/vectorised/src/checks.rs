@@ -13,6 +13,7 @@ use haptic_core::safety::plausibility::{self, ALIGNING_ERROR, PUSHED, UNREAL};
 use haptic_core::safety::yaw::{self, BIAS_SHIFT};
 
 use super::counts::{ONE, flag, ms, speed_heard};
+use super::lanes::lanes;
 use super::rejected::Reason;
 use haptic_sim::scenario::Scenario;
 
@@ -59,45 +60,47 @@ const VEHICLE_S: f64 = 0.010;
 const LINES: usize = 32;
 const LINE_US: i32 = 25_000;
 
-/// The sums of several runs.
-#[repr(C, align(64))]
-pub(super) struct Checks<const N: usize> {
-    speed: [f64; N],
-    near_m: [f64; N],
-    aligning_gain: [f64; N],
-    /// The aligning torque of a vehicle that turns as its wheel says, N.m/rad.
-    per_wheel: [f64; N],
-    damping: [f64; N],
-    /// How fast the vehicle turns by its wheel, 1/s; what the yaw rate is more in the long run, and summed.
-    turns: [f64; N],
-    yaw_bias: [f64; N],
-    yaw_sum: [f64; N],
-    /// 0 until the first frames came, then 1.
-    began: [f64; N],
-    yaw_rate: [f64; N],
-    aligning: [f64; N],
-    heading: [f64; N],
-    wheel: [f64; N],
-    column_bias: [f64; N],
-    column_sum: [f64; N],
-    /// The driver torque, for how long it has been the same, ms, between which wheel angles, and what these may differ by.
-    torque: [f64; N],
-    still_ms: [i32; N],
-    least: [f64; N],
-    most: [f64; N],
-    may_turn: [f64; N],
-    /// The last picture, and whether it differed from the one before.
-    e_y: [f64; N],
-    e_theta: [f64; N],
-    is_alive: [f64; N],
-    /// Heading and yaw rate at the last picture.
-    heading_then: [f64; N],
-    yaw_rate_then: [f64; N],
-    lane_bias: [f64; N],
-    predicted: [f64; N],
-    seen: [f64; N],
-    between_us: [i32; N],
-    lines: [[f64; N]; LINES],
+lanes! {
+    /// The sums of several runs.
+    pub(super) struct Checks {
+        speed: f64 = 0.0,
+        near_m: f64 = 0.0,
+        aligning_gain: f64 = 0.0,
+        /// The aligning torque of a vehicle that turns as its wheel says, N.m/rad.
+        per_wheel: f64 = 0.0,
+        damping: f64 = 0.0,
+        /// How fast the vehicle turns by its wheel, 1/s; what the yaw rate is more in the long run, and summed.
+        turns: f64 = 0.0,
+        yaw_bias: f64 = 0.0,
+        yaw_sum: f64 = 0.0,
+        /// 0 until the first frames came, then 1.
+        began: f64 = 0.0,
+        yaw_rate: f64 = 0.0,
+        aligning: f64 = 0.0,
+        heading: f64 = 0.0,
+        wheel: f64 = 0.0,
+        column_bias: f64 = 0.0,
+        column_sum: f64 = 0.0,
+        /// The driver torque, for how long it has been the same, ms, between which wheel angles, and what these may differ by.
+        torque: f64 = 0.0,
+        still_ms: i32 = 0,
+        least: f64 = 0.0,
+        most: f64 = 0.0,
+        may_turn: f64 = 0.0,
+        /// The last picture, and whether it differed from the one before.
+        e_y: f64 = 0.0,
+        e_theta: f64 = 0.0,
+        is_alive: f64 = 0.0,
+        /// Heading and yaw rate at the last picture.
+        heading_then: f64 = 0.0,
+        yaw_rate_then: f64 = 0.0,
+        lane_bias: f64 = 0.0,
+        predicted: f64 = 0.0,
+        seen: f64 = 0.0,
+        between_us: i32 = 0,
+    } beside {
+        lines: [[f64; N]; LINES] = [[0.0; N]; LINES],
+    }
 }
 
 /// What of an interval is nearest to zero.
@@ -107,48 +110,13 @@ fn nearest_to_zero(least: f64, most: f64) -> f64 {
 }
 
 impl<const N: usize> Checks<N> {
-    pub(super) fn new() -> Self {
-        Self {
-            speed: [0.0; N],
-            near_m: [0.0; N],
-            aligning_gain: [0.0; N],
-            per_wheel: [0.0; N],
-            damping: [0.0; N],
-            turns: [0.0; N],
-            yaw_bias: [0.0; N],
-            yaw_sum: [0.0; N],
-            began: [0.0; N],
-            yaw_rate: [0.0; N],
-            aligning: [0.0; N],
-            heading: [0.0; N],
-            wheel: [0.0; N],
-            column_bias: [0.0; N],
-            column_sum: [0.0; N],
-            torque: [0.0; N],
-            still_ms: [0; N],
-            least: [0.0; N],
-            most: [0.0; N],
-            may_turn: [0.0; N],
-            e_y: [0.0; N],
-            e_theta: [0.0; N],
-            is_alive: [0.0; N],
-            heading_then: [0.0; N],
-            yaw_rate_then: [0.0; N],
-            lane_bias: [0.0; N],
-            predicted: [0.0; N],
-            seen: [0.0; N],
-            between_us: [0; N],
-            lines: [[0.0; N]; LINES],
-        }
-    }
-
     pub(super) fn begin(&mut self, lane: usize, scenario: &Scenario) {
+        self.clear(lane);
         let params = scenario.controller_params();
         self.hear_speed(lane, &params, speed_heard(scenario));
         let vehicle = params.vehicle;
         self.aligning_gain[lane] = vehicle.aligning_gain_nm_s2_per_m;
         self.damping[lane] = vehicle.column_damping_nm_s;
-        self.still_ms[lane] = 0;
         self.may_turn[lane] = if scenario.guidance().probe {
             TURNED_WHEN_ASKED
         } else {
@@ -156,30 +124,6 @@ impl<const N: usize> Checks<N> {
         };
         let between_s = (vehicle.far_time_s - vehicle.near_time_s).max(0.0);
         self.between_us[lane] = (between_s * 1e6 + 0.5) as i32;
-        for state in [
-            &mut self.began,
-            &mut self.yaw_bias,
-            &mut self.yaw_sum,
-            &mut self.yaw_rate,
-            &mut self.aligning,
-            &mut self.heading,
-            &mut self.wheel,
-            &mut self.column_bias,
-            &mut self.column_sum,
-            &mut self.torque,
-            &mut self.least,
-            &mut self.most,
-            &mut self.e_y,
-            &mut self.e_theta,
-            &mut self.is_alive,
-            &mut self.heading_then,
-            &mut self.yaw_rate_then,
-            &mut self.lane_bias,
-            &mut self.predicted,
-            &mut self.seen,
-        ] {
-            state[lane] = 0.0;
-        }
     }
 
     /// A speed that is another than before is heard.

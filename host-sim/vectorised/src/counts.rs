@@ -48,6 +48,16 @@ pub(super) const fn ms(span: Micros) -> u32 {
     span.us() / 1000
 }
 
+/// Counts as SI values.
+#[inline(always)]
+pub(super) fn si<const N: usize>(counts: &[i32; N]) -> [f64; N] {
+    let mut si = [0.0; N];
+    for l in 0..N {
+        si[l] = f64::from(counts[l]) * (1.0 / ONE);
+    }
+    si
+}
+
 #[inline(always)]
 pub(super) fn flag(holds: bool) -> i32 {
     if holds { -1 } else { 0 }

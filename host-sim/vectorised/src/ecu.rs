@@ -13,6 +13,7 @@ use haptic_core::safety::{envelope, hands, plausibility, ramp};
 use super::band::{Band, GUIDED, HANDOVER, OFF};
 use super::coast::{Coast, GOES_ON_MS};
 use super::counts::{MS, ONE, bits, flag, ms, on_the_bus, per_second, small_bits, speed_heard, truncated};
+use super::lanes::lanes;
 use super::probe::Probes;
 use super::rejected::Reason;
 use haptic_sim::models::sensors::TORQUE_RESOLUTION_NM;
@@ -46,58 +47,60 @@ const OPPOSES: i32 = bits(ramp::OPPOSES.nm());
 /// Torques kept for a handover, one every 5 ms.
 const PAST: usize = 16;
 
-/// The ECUs.
-#[repr(C, align(64))]
-pub(super) struct Ecus<const N: usize> {
-    /// Gains of the law, on e_y, its rate, e_theta and its rate.
-    gains: [[i32; N]; 4],
-    /// Of the rates' filter, 2^-8 us.
-    tau: [i32; N],
-    /// Share of the law's torque at this speed.
-    scheduled: [i32; N],
-    limit: [i32; N],
-    /// What a step may change: none in the first, which takes no time.
-    growth: [i32; N],
-    fall: [i32; N],
-    growth_in_a_step: [i32; N],
-    fall_in_a_step: [i32; N],
-    /// -1 until the first picture came.
-    first: [i32; N],
-    e_y: [i32; N],
-    e_theta: [i32; N],
-    e_y_rate: [i32; N],
-    e_theta_rate: [i32; N],
-    /// Age of the lane sample, as a share of a second in 2^-32.
-    age: [i32; N],
-    /// The torque of the last step.
-    pub(super) applied: [i32; N],
-    anchor: [i32; N],
-    anchor_step: [i32; N],
-    pub(super) driver: [i32; N],
-    felt: [i32; N],
-    without_ms: [i32; N],
-    /// For how long the driver has been asked for a hand, and when an answer comes.
-    asked_ms: [i32; N],
-    answer_ms: [i32; N],
-    mode: [i32; N],
-    /// -1 where what the ECU does matters: it guides, and its torque is applied.
-    matters: [i32; N],
-    /// -1 where the ECU hears the camera.
-    pub(super) hears: [i32; N],
-    /// Not 0 where something could have ended guidance.
-    pub(super) suspect: [i32; N],
-    ramp_from: [i32; N],
-    ramp_done: [i32; N],
-    /// Whether a limit held the torque of the last step. Not beside it: the compiler would take both for one vector.
-    limited: [i32; N],
-    motion_history: [[i32; N]; PAST],
-    /// How many torques were kept so far.
-    kept: usize,
-    band: Band<N>,
-    probes: Probes<N>,
-    /// Runs whose lane preview fails, and whether there is one.
-    coasts: [Option<Box<Coast>>; N],
-    has_coasts: bool,
+lanes! {
+    /// The ECUs.
+    pub(super) struct Ecus {
+        /// Of the rates' filter, 2^-8 us.
+        tau: i32 = 1,
+        /// Share of the law's torque at this speed.
+        scheduled: i32 = 0,
+        limit: i32 = 0,
+        /// What a step may change: none in the first, which takes no time.
+        growth: i32 = 0,
+        fall: i32 = 0,
+        growth_in_a_step: i32 = 0,
+        fall_in_a_step: i32 = 0,
+        /// -1 until the first picture came.
+        first: i32 = -1,
+        e_y: i32 = 0,
+        e_theta: i32 = 0,
+        e_y_rate: i32 = 0,
+        e_theta_rate: i32 = 0,
+        /// Age of the lane sample, as a share of a second in 2^-32.
+        age: i32 = 0,
+        /// The torque of the last step.
+        pub(super) applied: i32 = 0,
+        anchor: i32 = 0,
+        anchor_step: i32 = 0,
+        pub(super) driver: i32 = 0,
+        felt: i32 = 0,
+        without_ms: i32 = 0,
+        /// For how long the driver has been asked for a hand, and when an answer comes.
+        asked_ms: i32 = 0,
+        answer_ms: i32 = 0,
+        mode: i32 = OFF,
+        /// -1 where what the ECU does matters: it guides, and its torque is applied.
+        pub(super) matters: i32 = 0,
+        /// -1 where the ECU hears the camera.
+        pub(super) hears: i32 = 0,
+        /// Not 0 where something could have ended guidance.
+        pub(super) suspect: i32 = 0,
+        ramp_from: i32 = 0,
+        ramp_done: i32 = 0,
+        /// Whether a limit held the torque of the last step. Not beside it: the compiler would take both for one vector.
+        pub(super) limited: i32 = 0,
+    } beside {
+        /// Gains of the law, on e_y, its rate, e_theta and its rate.
+        gains: [[i32; N]; 4] = [[0; N]; 4],
+        motion_history: [[i32; N]; PAST] = [[0; N]; PAST],
+        /// How many torques were kept so far.
+        kept: usize = 0,
+        band: Band<N> = Band::new(),
+        probes: Probes<N> = Probes::new(),
+        /// Runs whose lane preview fails, and whether there is one.
+        coasts: [Option<Box<Coast>>; N] = [const { None }; N],
+        pub(super) has_coasts: bool = false,
+    }
 }
 
 /// One update of a filtered rate: core's rounded quotient. A quotient of doubles is off by one at most, which what is left
@@ -117,51 +120,9 @@ fn filtered(tau: i32, rate: i32, change: i32, dt_us: i32) -> i32 {
 }
 
 impl<const N: usize> Ecus<N> {
-    pub(super) fn new() -> Self {
-        const fn zero<const N: usize>() -> [i32; N] {
-            [0; N]
-        }
-        Self {
-            gains: [zero(); 4],
-            tau: [1; N],
-            scheduled: zero(),
-            limit: zero(),
-            growth: zero(),
-            fall: zero(),
-            growth_in_a_step: zero(),
-            fall_in_a_step: zero(),
-            first: zero(),
-            e_y: zero(),
-            e_theta: zero(),
-            e_y_rate: zero(),
-            e_theta_rate: zero(),
-            age: zero(),
-            applied: zero(),
-            limited: zero(),
-            anchor: zero(),
-            anchor_step: zero(),
-            driver: zero(),
-            felt: zero(),
-            without_ms: zero(),
-            asked_ms: zero(),
-            answer_ms: zero(),
-            mode: [OFF; N],
-            matters: zero(),
-            hears: zero(),
-            suspect: zero(),
-            ramp_from: zero(),
-            ramp_done: zero(),
-            motion_history: [zero(); PAST],
-            kept: 0,
-            band: Band::new(),
-            probes: Probes::new(),
-            coasts: [const { None }; N],
-            has_coasts: false,
-        }
-    }
-
     /// A new run begins in a lane: engaged, as the paper's studies have it, or without guidance.
     pub(super) fn begin(&mut self, lane: usize, scenario: &Scenario) {
+        self.clear(lane);
         let p = scenario.controller_params();
         let guided = scenario.condition() != Condition::Manual;
         let gains = [p.a_1, p.a_2, p.a_3, p.a_4].map(|a| p.k_1 * a);
@@ -178,29 +139,6 @@ impl<const N: usize> Ecus<N> {
         (self.matters[lane], self.hears[lane]) = (flag(guided), flag(guided));
         // Where it never comes, the largest number.
         self.answer_ms[lane] = (1e3 * scenario.driver().answers_hands_off_after_s) as i32;
-        self.first[lane] = -1;
-        for state in [
-            &mut self.growth,
-            &mut self.fall,
-            &mut self.e_y,
-            &mut self.e_theta,
-            &mut self.e_y_rate,
-            &mut self.e_theta_rate,
-            &mut self.age,
-            &mut self.applied,
-            &mut self.limited,
-            &mut self.anchor,
-            &mut self.anchor_step,
-            &mut self.driver,
-            &mut self.felt,
-            &mut self.without_ms,
-            &mut self.asked_ms,
-            &mut self.suspect,
-            &mut self.ramp_from,
-            &mut self.ramp_done,
-        ] {
-            state[lane] = 0;
-        }
         for torques in &mut self.motion_history {
             torques[lane] = 0;
         }
@@ -214,11 +152,6 @@ impl<const N: usize> Ecus<N> {
     pub(super) fn will_lose(&mut self, lane: usize, coast: Option<Coast>) {
         self.coasts[lane] = coast.map(Box::new);
         self.has_coasts = self.coasts.iter().any(Option::is_some);
-    }
-
-    /// Whether some run's lane preview fails.
-    pub(super) fn has_coasts(&self) -> bool {
-        self.has_coasts
     }
 
     /// A speed that is another than before is heard.
@@ -519,38 +452,6 @@ impl<const N: usize> Ecus<N> {
             torque[l] = held;
             limited[l] = is_limited;
         }
-    }
-
-    /// The torque of this step as the actuator has it, N.m.
-    #[inline(always)]
-    pub(super) fn torque_nm(&self) -> [f64; N] {
-        let mut torque = [0.0; N];
-        for l in 0..N {
-            torque[l] = f64::from(self.applied[l]) * (1.0 / ONE);
-        }
-        torque
-    }
-
-    /// The driver's torque as the ECU has it, N.m.
-    #[inline(always)]
-    pub(super) fn driver_nm(&self) -> [f64; N] {
-        let mut torque = [0.0; N];
-        for l in 0..N {
-            torque[l] = f64::from(self.driver[l]) * (1.0 / ONE);
-        }
-        torque
-    }
-
-    /// Whether a limit held the torque of this step.
-    #[inline(always)]
-    pub(super) fn is_limited(&self, lane: usize) -> bool {
-        self.limited[lane] != 0
-    }
-
-    /// Whether what the ECU decides matters.
-    #[inline(always)]
-    pub(super) fn matters(&self) -> &[i32; N] {
-        &self.matters
     }
 }
 

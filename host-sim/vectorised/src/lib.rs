@@ -28,6 +28,7 @@ mod coast;
 mod counts;
 mod divide;
 mod ecu;
+mod lanes;
 mod nonlinear;
 mod points;
 mod probe;

@@ -3,44 +3,36 @@
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
+use super::lanes::lanes;
 use super::tracked::{HEADING, OFFSET, Tracked};
 use haptic_sim::models::road::Centreline;
 
-/// A near and a far point of each run.
-#[repr(C, align(64))]
-pub(super) struct Points<const N: usize> {
-    /// How far ahead they are, s and m.
-    pub(super) times_s: [[f64; N]; 2],
-    pub(super) near_m: [f64; N],
-    pub(super) far_m: [f64; N],
-    near: Tracked<N>,
-    pub(super) far: Tracked<N>,
-    /// The errors found.
-    pub(super) e_y: [f64; N],
-    pub(super) e_theta: [f64; N],
+lanes! {
+    /// A near and a far point of each run.
+    pub(super) struct Points {
+        /// How far ahead they are, m.
+        pub(super) near_m: f64 = 0.0,
+        pub(super) far_m: f64 = 0.0,
+        /// The errors found.
+        pub(super) e_y: f64 = 0.0,
+        pub(super) e_theta: f64 = 0.0,
+    } beside {
+        /// The same, s.
+        pub(super) times_s: [[f64; N]; 2] = [[0.0; N]; 2],
+        near: Tracked<N> = Tracked::new(),
+        pub(super) far: Tracked<N> = Tracked::new(),
+    }
 }
 
 impl<const N: usize> Points<N> {
-    pub(super) fn new() -> Self {
-        Self {
-            times_s: [[0.0; N]; 2],
-            near_m: [0.0; N],
-            far_m: [0.0; N],
-            near: Tracked::new(),
-            far: Tracked::new(),
-            e_y: [0.0; N],
-            e_theta: [0.0; N],
-        }
-    }
-
     /// A new run begins in a lane: its points are so far ahead at this speed.
     pub(super) fn begin(&mut self, lane: usize, road: &Centreline, times_s: [f64; 2], v_m_per_s: f64) {
+        self.clear(lane);
         [self.times_s[0][lane], self.times_s[1][lane]] = times_s;
         let [near_m, far_m] = times_s.map(|time_s| v_m_per_s * time_s);
         (self.near_m[lane], self.far_m[lane]) = (near_m, far_m);
         self.near.begin(lane, road, &road.tracker(near_m));
         self.far.begin(lane, road, &road.tracker(far_m));
-        (self.e_y[lane], self.e_theta[lane]) = (0.0, 0.0);
     }
 
     /// Looks at the road from a place in a direction, as a unit vector and as an angle, in the runs that are selected.

@@ -6,47 +6,37 @@ use haptic_core::controller::params::Params;
 use haptic_core::law::probe::SIXTEENTH;
 
 use super::counts::bits;
+use super::lanes::lanes;
 
 /// A quarter turn, and the coefficients of core's sine on it in 2^-30.
 const QUARTER: u32 = 1 << 30;
 const SINE: [i32; 4] = [1_686_623_910, -693_521_754, 85_290_965, -4_651_906];
 const ONE: i32 = 1 << 30;
 
-/// The probes.
-#[repr(C, align(64))]
-pub(super) struct Probes<const N: usize> {
-    /// 0 in a run without one.
-    amplitude: [i32; N],
-    /// What a step advances phase and gain by: nothing in the first, which takes no time.
-    advance: [u32; N],
-    advance_in_a_step: [u32; N],
-    phase: [u32; N],
-    gain: [u32; N],
-    /// The part of the torque applied that is the probe.
-    pub(super) applied: [i32; N],
-    is_any: bool,
+lanes! {
+    /// The probes.
+    pub(super) struct Probes {
+        /// 0 in a run without one.
+        amplitude: i32 = 0,
+        /// What a step advances phase and gain by: nothing in the first, which takes no time.
+        advance: u32 = 0,
+        advance_in_a_step: u32 = 0,
+        phase: u32 = 0,
+        gain: u32 = 0,
+        /// The part of the torque applied that is the probe.
+        pub(super) applied: i32 = 0,
+    } beside {
+        is_any: bool = false,
+    }
 }
 
 impl<const N: usize> Probes<N> {
-    pub(super) fn new() -> Self {
-        Self {
-            amplitude: [0; N],
-            advance: [0; N],
-            advance_in_a_step: [0; N],
-            phase: [0; N],
-            gain: [0; N],
-            applied: [0; N],
-            is_any: false,
-        }
-    }
-
     /// A new run begins in a lane, with a probe or without.
     pub(super) fn begin(&mut self, lane: usize, p: &Params, is_wanted: bool) {
+        self.clear(lane);
         self.amplitude[lane] = if is_wanted { bits(p.probe_amplitude_nm) } else { 0 };
         let per_us = (p.probe_frequency_hz * 4_294.967_296 + 0.5) as u32;
         self.advance_in_a_step[lane] = per_us.wrapping_mul(1000);
-        (self.advance[lane], self.phase[lane], self.gain[lane]) = (0, 0, 0);
-        self.applied[lane] = 0;
         self.is_any = self.amplitude.iter().any(|amplitude| *amplitude != 0);
     }
 

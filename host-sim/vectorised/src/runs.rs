@@ -9,6 +9,7 @@ use haptic_log::trace::{Sample, Trace};
 
 use super::checks::Checks;
 use super::coast::{BLIND_MS, Coast};
+use super::counts::si;
 use super::ecu::{Ecus, TIMEOUT_MS};
 use super::rejected::Reason;
 use super::sensing::Senses;
@@ -31,16 +32,6 @@ use haptic_sim::unguided::Cause;
 const BLOCK: u32 = 50;
 /// How much longer a run's way may be than the course: a vehicle that weaves by 8 degrees to both sides throughout.
 const DETOUR: f64 = 1.01;
-
-/// One step of every run, as [`Step`] has it of one.
-#[derive(Debug, Clone, Copy)]
-struct Steps<const N: usize> {
-    e_y_m: [f64; N],
-    e_theta_rad: [f64; N],
-    wheel_angle_rad: [f64; N],
-    guidance_torque_nm: [f64; N],
-    driver_torque_nm: [f64; N],
-}
 
 thread_local! {
     /// Room for the samples of a lane each, from the runs before: new room of some megabytes a run would be handed back to
@@ -79,7 +70,7 @@ pub(super) struct Runs<const N: usize> {
     /// Whether something is planned in some lane within this block.
     has_events: bool,
     /// The steps of the last block, where they are asked for.
-    steps: Option<Vec<Steps<N>>>,
+    steps: Option<Vec<[Step; N]>>,
     roads: [Arc<Centreline>; N],
     slots: [Slot; N],
 }
@@ -225,17 +216,10 @@ impl<const N: usize> Runs<N> {
     pub(super) fn steps_of_block(&self, lane: usize, found: &mut Vec<Step>) -> Option<usize> {
         let (steps, slot) = (self.steps.as_ref()?, &self.slots[lane]);
         let number = slot.scenario?;
-        let first = self.own[lane] as u32 - steps.len() as u32;
         let end = if slot.is_whole { slot.run.steps } else { u32::MAX };
         found.clear();
-        found.extend((first..end).zip(steps).map(|(step, all)| Step {
-            step,
-            e_y_m: all.e_y_m[lane],
-            e_theta_rad: all.e_theta_rad[lane],
-            wheel_angle_rad: all.wheel_angle_rad[lane],
-            guidance_torque_nm: all.guidance_torque_nm[lane],
-            driver_torque_nm: all.driver_torque_nm[lane],
-        }));
+        let of_lane = steps.iter().map(|all| all[lane]);
+        found.extend(of_lane.take_while(|step| step.step < end));
         Some(number)
     }
 
@@ -287,7 +271,7 @@ impl<const N: usize> Runs<N> {
         self.receive(phase, looks, &driver_nm);
         self.hear_motors(phase);
         self.ecus.decide(&self.own, phase == 0, is_sample);
-        let torque_nm = self.ecus.torque_nm();
+        let torque_nm = si(&self.ecus.applied);
         // Not before: the ECUs do not wait for where the cars moved to, so that the processor has work meanwhile. A run that
         // ends here has decided once more, and nobody has heard it.
         if self.worlds.driver_looks::<FUSED>(&self.roads) {
@@ -295,17 +279,18 @@ impl<const N: usize> Runs<N> {
         }
         if is_sample {
             self.worlds.locate::<FUSED>(&self.roads);
-            self.speeds.locate(self.worlds.body.s());
+            self.speeds.locate(&self.worlds.body.s);
             self.record(&driver_nm, &torque_nm);
         }
         if let Some(steps) = &mut self.steps {
-            steps.push(Steps {
-                e_y_m: self.worlds.driver.e_y,
-                e_theta_rad: self.worlds.driver.e_theta,
-                wheel_angle_rad: self.worlds.state[WHEEL],
-                guidance_torque_nm: torque_nm,
-                driver_torque_nm: driver_nm,
-            });
+            steps.push(std::array::from_fn(|l| Step {
+                step: self.own[l] as u32,
+                e_y_m: self.worlds.driver.e_y[l],
+                e_theta_rad: self.worlds.driver.e_theta[l],
+                wheel_angle_rad: self.worlds.state[WHEEL][l],
+                guidance_torque_nm: torque_nm[l],
+                driver_torque_nm: driver_nm[l],
+            }));
         }
         let speeds = self.speeds.of_step(&self.own);
         self.worlds
@@ -369,7 +354,7 @@ impl<const N: usize> Runs<N> {
             }
             samples.push(Sample {
                 time_s: f64::from(self.own[l]) * STEP_S,
-                s_m: body.s()[l],
+                s_m: body.s[l],
                 lateral_error_m: body.offset[l],
                 heading_error_rad: wrapped(chi[l] - body.found_heading[l]),
                 curvature_1pm: body.found_curvature[l],
@@ -384,7 +369,7 @@ impl<const N: usize> Runs<N> {
                 speed_m_per_s: self.speeds.now[l],
                 driver_torque_nm: driver_nm[l],
                 guidance_torque_nm: torque_nm[l],
-                guidance_limited: self.ecus.is_limited(l),
+                guidance_limited: self.ecus.limited[l] != 0,
                 unguided_cause: slot.unguided_cause,
             });
         }

@@ -1,39 +1,31 @@
 //! What the sensors of several runs add to the truth: constant errors for all at once, noise from each run's own gyro and
 //! camera ([`haptic_sim::models::disturbances`]), which draw as they do in a run alone.
 
-use haptic_sim::models::disturbances::SensorErrors;
+use super::lanes::lanes;
 use haptic_sim::simulation::Sensing;
 
-/// The sensors.
-#[repr(C, align(64))]
-pub(super) struct Senses<const N: usize> {
-    torque_gain: [f64; N],
-    torque_bias: [f64; N],
-    angle_bias: [f64; N],
-    /// Of the runs whose sensors have errors.
-    own: [Option<Box<Sensing>>; N],
-    is_any: bool,
+lanes! {
+    /// The sensors.
+    pub(super) struct Senses {
+        torque_gain: f64 = 1.0,
+        torque_bias: f64 = 0.0,
+        angle_bias: f64 = 0.0,
+    } beside {
+        /// Of the runs whose sensors have errors.
+        own: [Option<Box<Sensing>>; N] = [const { None }; N],
+        is_any: bool = false,
+    }
 }
 
 impl<const N: usize> Senses<N> {
-    pub(super) fn new() -> Self {
-        Self {
-            torque_gain: [1.0; N],
-            torque_bias: [0.0; N],
-            angle_bias: [0.0; N],
-            own: [const { None }; N],
-            is_any: false,
-        }
-    }
-
     /// A new run begins in a lane.
     pub(super) fn begin(&mut self, lane: usize, sensing: Option<Box<Sensing>>) {
-        let errors = sensing
-            .as_ref()
-            .map_or_else(SensorErrors::default, |sensing| sensing.errors);
-        self.torque_gain[lane] = errors.torque_gain;
-        self.torque_bias[lane] = errors.torque_bias_nm;
-        self.angle_bias[lane] = errors.angle_bias_rad;
+        self.clear(lane);
+        if let Some(Sensing { errors, .. }) = sensing.as_deref() {
+            self.torque_gain[lane] = errors.torque_gain;
+            self.torque_bias[lane] = errors.torque_bias_nm;
+            self.angle_bias[lane] = errors.angle_bias_rad;
+        }
         self.own[lane] = sensing;
         self.is_any = self.own.iter().any(Option::is_some);
     }

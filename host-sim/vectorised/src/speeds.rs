@@ -9,6 +9,7 @@ use haptic_core::safety::plausibility;
 use super::checks::Checks;
 use super::counts::{ONE, bits, flag, heard, speed_heard};
 use super::ecu::Ecus;
+use super::lanes::lanes;
 use super::rejected::Reason;
 use super::world::Worlds;
 use haptic_sim::models::STEP_S;
@@ -20,15 +21,17 @@ use haptic_sim::simulation::Plan;
 const SPEED_LSB: i32 = 1 << 16;
 const SPEED_STEP: i32 = bits(0.9 * plausibility::SPEED_STEP.m_per_s());
 
-/// The speeds.
-#[repr(C, align(64))]
-pub(super) struct Speeds<const N: usize> {
-    /// Now, and at the end of the step, m/s.
-    pub(super) now: [f64; N],
-    next: [f64; N],
-    place_m: [f64; N],
-    changing: [Option<Box<Changing>>; N],
-    is_any: bool,
+lanes! {
+    /// The speeds.
+    pub(super) struct Speeds {
+        /// Now, and at the end of the step, m/s.
+        pub(super) now: f64 = 1.0,
+        next: f64 = 1.0,
+        place_m: f64 = 0.0,
+    } beside {
+        changing: [Option<Box<Changing>>; N] = [const { None }; N],
+        is_any: bool = false,
+    }
 }
 
 /// A run whose speed changes.
@@ -44,20 +47,11 @@ struct Changing {
 }
 
 impl<const N: usize> Speeds<N> {
-    pub(super) fn new() -> Self {
-        Self {
-            now: [1.0; N],
-            next: [1.0; N],
-            place_m: [0.0; N],
-            changing: [const { None }; N],
-            is_any: false,
-        }
-    }
-
     /// A new run begins in a lane.
     pub(super) fn begin(&mut self, lane: usize, scenario: &Scenario, plan: &Plan) {
         let v = scenario.speed_m_per_s();
-        (self.now[lane], self.next[lane], self.place_m[lane]) = (v, v, 0.0);
+        self.clear(lane);
+        (self.now[lane], self.next[lane]) = (v, v);
         self.changing[lane] = plan.speed.is_some().then(|| {
             let params = scenario.controller_params();
             Box::new(Changing {

@@ -6,40 +6,44 @@
 use std::sync::Arc;
 
 use super::divide::{FORTY, SIX, TWENTY_FOUR};
+use super::lanes::lanes;
 use super::{ALIVE, Aligned};
 use haptic_sim::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Shape, Tracker};
 
 /// Steps of a search, of which one or two are the rule.
 const MOST_STEPS: usize = 4;
 
-/// One point of each run.
-#[repr(C, align(64))]
-pub(super) struct Tracked<const N: usize> {
-    s: [f64; N],
-    advance: [f64; N],
-    /// Ends of the cell.
-    low: [f64; N],
-    high: [f64; N],
-    middle: [f64; N],
-    x: [f64; N],
-    y: [f64; N],
-    tangent_x: [f64; N],
-    tangent_y: [f64; N],
-    heading: [f64; N],
-    curvature: [f64; N],
-    slope: [f64; N],
-    square_over_6: [f64; N],
-    cube: [f64; N],
-    /// Largest arc length that a search may end at.
-    end: [f64; N],
-    /// What was found, as a [`haptic_sim::models::road::Projection`] has it.
-    pub(super) offset: [f64; N],
-    pub(super) found_heading: [f64; N],
-    pub(super) found_curvature: [f64; N],
-    cell: [usize; N],
-    /// Of the cell of each point, and the most bent of them.
-    shapes: [u8; N],
-    shape: u8,
+lanes! {
+    /// One point of each run.
+    pub(super) struct Tracked {
+        /// Arc lengths found.
+        pub(super) s: f64 = 0.0,
+        advance: f64 = 0.0,
+        /// Ends of the cell.
+        low: f64 = 0.0,
+        high: f64 = 0.0,
+        middle: f64 = 0.0,
+        x: f64 = 0.0,
+        y: f64 = 0.0,
+        tangent_x: f64 = 0.0,
+        tangent_y: f64 = 0.0,
+        heading: f64 = 0.0,
+        curvature: f64 = 0.0,
+        slope: f64 = 0.0,
+        square_over_6: f64 = 0.0,
+        cube: f64 = 0.0,
+        /// Largest arc length that a search may end at.
+        end: f64 = 0.0,
+        /// What was found, as a [`haptic_sim::models::road::Projection`] has it.
+        pub(super) offset: f64 = 0.0,
+        pub(super) found_heading: f64 = 0.0,
+        pub(super) found_curvature: f64 = 0.0,
+        cell: usize = 0,
+    } beside {
+        /// Of the cell of each point, and the most bent of them.
+        shapes: [u8; N] = [STRAIGHT; N],
+        shape: u8 = STRAIGHT,
+    }
 }
 
 /// What of a projection is kept.
@@ -53,38 +57,6 @@ const ARC: u8 = Shape::Arc as u8;
 const CLOTHOID: u8 = Shape::Clothoid as u8;
 
 impl<const N: usize> Tracked<N> {
-    pub(super) fn new() -> Self {
-        Self {
-            s: [0.0; N],
-            advance: [0.0; N],
-            low: [0.0; N],
-            high: [0.0; N],
-            middle: [0.0; N],
-            x: [0.0; N],
-            y: [0.0; N],
-            tangent_x: [0.0; N],
-            tangent_y: [0.0; N],
-            heading: [0.0; N],
-            curvature: [0.0; N],
-            slope: [0.0; N],
-            square_over_6: [0.0; N],
-            cube: [0.0; N],
-            end: [0.0; N],
-            offset: [0.0; N],
-            found_heading: [0.0; N],
-            found_curvature: [0.0; N],
-            cell: [0; N],
-            shapes: [STRAIGHT; N],
-            shape: STRAIGHT,
-        }
-    }
-
-    /// Arc lengths found.
-    #[inline(always)]
-    pub(super) fn s(&self) -> &[f64; N] {
-        &self.s
-    }
-
     /// Where a point was found last.
     pub(super) fn place(&self, lane: usize) -> Tracker {
         Tracker {
@@ -96,6 +68,7 @@ impl<const N: usize> Tracked<N> {
 
     /// A new run begins in a lane.
     pub(super) fn begin(&mut self, lane: usize, road: &Centreline, tracker: &Tracker) {
+        self.clear(lane);
         (self.s[lane], self.advance[lane]) = (tracker.s_m, tracker.advance_m);
         self.end[lane] = road.length_m() + OVERRUN_M;
         self.enter(lane, road, tracker.cell);

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::divide::{SIX, TWENTY_FOUR};
+use super::lanes::lanes;
 use super::nonlinear::{Acting, NonlinearVehicles};
 use super::points::Points;
 use super::tracked::{ALL, Tracked};
@@ -15,84 +16,46 @@ use haptic_sim::models::road::Centreline;
 use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::{DIVERGED_M, Plan};
 
-/// The worlds.
-#[repr(C, align(64))]
-pub(super) struct Worlds<const N: usize> {
-    pub(super) state: [[f64; N]; STATES],
-    x: [f64; N],
-    y: [f64; N],
-    direction: [[f64; N]; 2],
-    distance: [f64; N],
-    columns: [[[f64; N]; STATES]; COLUMNS],
-    a: [[f64; N]; 3],
-    /// The driver's line, m right of the middle.
-    right: [f64; N],
-    integral: [f64; N],
-    last_e_y: [f64; N],
-    fraction: [f64; N],
-    older: [f64; N],
-    target: [f64; N],
-    end: [f64; N],
-    pub(super) driver: Points<N>,
-    pub(super) camera: Points<N>,
-    pub(super) body: Tracked<N>,
-    pub(super) nonlinear: NonlinearVehicles<N>,
-    pub(super) remnant_nm: [f64; N],
-    /// [`ALIVE`] where a run is under way.
-    pub(super) alive: [u64; N],
-    /// Not 0 where something happened that is not modelled here.
-    pub(super) suspect: [u64; N],
-    /// Inputs of the delays, one row a step.
-    delayed: Vec<[f64; N]>,
-    next: usize,
-    whole: [usize; N],
+lanes! {
+    /// The worlds; `whole` is the longest delay, in steps.
+    pub(super) struct Worlds {
+        x: f64 = 0.0,
+        y: f64 = 0.0,
+        distance: f64 = 0.0,
+        /// The driver's line, m right of the middle.
+        right: f64 = 0.0,
+        integral: f64 = 0.0,
+        last_e_y: f64 = 0.0,
+        fraction: f64 = 0.0,
+        older: f64 = 0.0,
+        target: f64 = 0.0,
+        end: f64 = 0.0,
+        pub(super) remnant_nm: f64 = 0.0,
+        /// [`ALIVE`] where a run is under way.
+        pub(super) alive: u64 = 0,
+        /// Not 0 where something happened that is not modelled here.
+        pub(super) suspect: u64 = 0,
+        whole: usize = 1,
+    } beside (whole: usize) {
+        pub(super) state: [[f64; N]; STATES] = [[0.0; N]; STATES],
+        direction: [[f64; N]; 2] = [[1.0; N], [0.0; N]],
+        columns: [[[f64; N]; STATES]; COLUMNS] = [[[0.0; N]; STATES]; COLUMNS],
+        a: [[f64; N]; 3] = [[0.0; N]; 3],
+        pub(super) driver: Points<N> = Points::new(),
+        pub(super) camera: Points<N> = Points::new(),
+        pub(super) body: Tracked<N> = Tracked::new(),
+        pub(super) nonlinear: NonlinearVehicles<N> = NonlinearVehicles::new(),
+        /// Inputs of the delays, one row a step.
+        delayed: Vec<[f64; N]> = vec![[0.0; N]; (whole + 1).next_power_of_two()],
+        next: usize = 0,
+    }
 }
 
 impl<const N: usize> Worlds<N> {
-    /// `whole` is the longest delay, in steps.
-    pub(super) fn new(whole: usize) -> Self {
-        Self {
-            state: [[0.0; N]; STATES],
-            x: [0.0; N],
-            y: [0.0; N],
-            direction: [[1.0; N], [0.0; N]],
-            distance: [0.0; N],
-            columns: [[[0.0; N]; STATES]; COLUMNS],
-            a: [[0.0; N]; 3],
-            right: [0.0; N],
-            integral: [0.0; N],
-            last_e_y: [0.0; N],
-            fraction: [0.0; N],
-            older: [0.0; N],
-            target: [0.0; N],
-            end: [0.0; N],
-            driver: Points::new(),
-            camera: Points::new(),
-            body: Tracked::new(),
-            nonlinear: NonlinearVehicles::new(),
-            remnant_nm: [0.0; N],
-            alive: [0; N],
-            suspect: [0; N],
-            delayed: vec![[0.0; N]; (whole + 1).next_power_of_two()],
-            next: 0,
-            whole: [1; N],
-        }
-    }
-
     /// A new run begins in a lane, as a simulation of it begins.
     pub(super) fn begin(&mut self, lane: usize, scenario: &Scenario, road: &Centreline, plan: &Plan) {
+        self.clear(lane);
         for state in &mut self.state {
-            state[lane] = 0.0;
-        }
-        for state in [
-            &mut self.x,
-            &mut self.y,
-            &mut self.integral,
-            &mut self.last_e_y,
-            &mut self.older,
-            &mut self.target,
-            &mut self.remnant_nm,
-        ] {
             state[lane] = 0.0;
         }
         (self.direction[0][lane], self.direction[1][lane]) = (1.0, 0.0);
@@ -108,7 +71,7 @@ impl<const N: usize> Worlds<N> {
         self.camera.begin(lane, road, [guidance.t_n, guidance.t_f], v);
         self.body.begin(lane, road, &road.tracker(0.0));
         self.end[lane] = plan.end_m(road, v);
-        (self.alive[lane], self.suspect[lane]) = (ALIVE, 0);
+        self.alive[lane] = ALIVE;
     }
 
     /// A run goes at another speed, and its course ends where its driver's far point is at `end_m`.
@@ -151,7 +114,7 @@ impl<const N: usize> Worlds<N> {
             .observe::<FUSED>(roads, place, &chi, &selected, &mut self.suspect);
         let mut ended = 0;
         for l in 0..N {
-            ended |= if self.driver.far.s()[l] >= self.end[l] {
+            ended |= if self.driver.far.s[l] >= self.end[l] {
                 selected[l]
             } else {
                 0
@@ -162,7 +125,7 @@ impl<const N: usize> Worlds<N> {
 
     /// Whether the run of a lane has come to its end.
     pub(super) fn is_at_its_end(&self, lane: usize) -> bool {
-        self.driver.far.s()[lane] >= self.end[lane]
+        self.driver.far.s[lane] >= self.end[lane]
     }
 
     /// The camera looks at the road in the runs that are selected.

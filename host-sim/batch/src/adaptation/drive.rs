@@ -16,46 +16,19 @@ const HELD_S: f64 = 1e6;
 /// A drive to be done.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Job {
-    driver: usize,
-    seed: u32,
-    what: What,
+    pub(super) driver: usize,
+    pub(super) seed: u32,
+    pub(super) what: What,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum What {
+pub(super) enum What {
     /// At a fixed gain, from a K_hg.
     Fixed { k_1: f64, begins: f64 },
     /// Under a law, at a K_hg that is held.
     Held { law: usize, k_hg: f64 },
     /// Under a law, with a loss.
     Free { law: usize },
-}
-
-impl Job {
-    fn new(driver: usize, what: What) -> Self {
-        Self {
-            driver,
-            seed: 0,
-            what,
-        }
-    }
-
-    /// The same with another seed.
-    pub(super) fn with_seed(self, seed: u32) -> Self {
-        Self { seed, ..self }
-    }
-
-    pub(super) fn fixed(driver: usize, k_1: f64, begins: f64) -> Self {
-        Self::new(driver, What::Fixed { k_1, begins })
-    }
-
-    pub(super) fn held(law: usize, driver: usize, k_hg: f64) -> Self {
-        Self::new(driver, What::Held { law, k_hg })
-    }
-
-    pub(super) fn free(law: usize, driver: usize) -> Self {
-        Self::new(driver, What::Free { law })
-    }
 }
 
 /// What adapts, in the mean of a second.

@@ -51,7 +51,7 @@ pub(super) fn from_text<'k>(
     kinds: &'k Kinds,
 ) -> Result<Adaptation<'k>, InputError> {
     let file: File = parse_toml(&source.name, text)?;
-    check_names("study", [&file.name]).map_err(|e| source.bad(e))?;
+    check_names(source, "study", [&file.name])?;
     rising(source, "map.k_1", &file.map.k_1, [0.0, 4.0])?;
     rising(source, "map.k_hg", &file.map.k_hg, [0.0, 1.0])?;
     let laws = parts(source, "law", &file.law, &kinds.laws)?;
@@ -76,11 +76,8 @@ pub(super) fn from_text<'k>(
     let (road, speed_kmh, scenario) = made.places.remove(0);
     let scenario = laid_end_to_end(source, &scenario, times.loop_s())?;
     for law in &laws {
-        let found = law.make(&scenario, &law.untuned()).map(|law| law.k_1());
-        match found {
-            Ok(Some(_)) => {}
-            Ok(None) => return Err(source.bad(format!("law {}: it is not (9) with a gain K_1", law.name))),
-            Err(error) => return Err(source.bad(format!("law {}: {error}", law.name))),
+        if law.check("law", source, &scenario)?.k_1().is_none() {
+            return Err(source.bad(format!("law {}: it is not (9) with a gain K_1", law.name)));
         }
     }
     for driver in &drivers {
@@ -88,8 +85,7 @@ pub(super) fn from_text<'k>(
             let what = "around ends with no habit \"trust\", which moves K_hg";
             return Err(source.bad(format!("driver {}: {what}", driver.name)));
         }
-        let found = driver.make(&scenario, &driver.untuned());
-        found.map_err(|e| source.bad(format!("driver {}: {e}", driver.name)))?;
+        driver.check("driver", source, &scenario)?;
     }
     let paper = [Table::from_iter([("kind".into(), "paper".into())])];
     let fixed = parts(source, "law", &paper, &kinds.laws)?.remove(0);

@@ -31,9 +31,10 @@ use serde::Serialize;
 
 use crate::compare::{Chosen, Kinds, Mean};
 use crate::files::Source;
+use crate::statistics::mean;
 use crate::study::interval_of_mean;
-use drive::Job;
 pub use drive::Seen;
+use drive::{Job, What};
 pub use linear::{Swing, of_series, steepest, swings};
 
 /// Small gain with a margin of two: the largest product of slopes that a law may have with a driver.
@@ -192,20 +193,19 @@ impl<'k> Adaptation<'k> {
 
     /// Every drive: the drivers' maps, then the laws' maps, then the closed loops; the seeds innermost.
     fn jobs(&self) -> Vec<Job> {
-        let mut jobs = Vec::new();
+        let mut drives = Vec::new();
         let ends = [self.k_hg[0], self.k_hg[self.k_hg.len() - 1]];
         for driver in 0..self.drivers.len() {
-            for k_1 in &self.k_1 {
-                jobs.extend(ends.map(|begins| Job::fixed(driver, *k_1, begins)));
+            for &k_1 in &self.k_1 {
+                drives.extend(ends.map(|begins| (driver, What::Fixed { k_1, begins })));
             }
         }
         for (law, driver) in self.pairs() {
-            jobs.extend(self.k_hg.iter().map(|held| Job::held(law, driver, *held)));
+            drives.extend(self.k_hg.iter().map(|&k_hg| (driver, What::Held { law, k_hg })));
         }
-        jobs.extend(self.pairs().map(|(law, driver)| Job::free(law, driver)));
-        jobs.into_iter()
-            .flat_map(|job| (0..self.seeds).map(move |seed| job.with_seed(seed)))
-            .collect()
+        drives.extend(self.pairs().map(|(law, driver)| (driver, What::Free { law })));
+        let job = |(driver, what)| (0..self.seeds).map(move |seed| Job { driver, seed, what });
+        drives.into_iter().flat_map(job).collect()
     }
 
     fn pairs(&self) -> impl Iterator<Item = (usize, usize)> {
@@ -298,7 +298,6 @@ impl<'k> Adaptation<'k> {
             .map(|drive| of_series(&drive.within([settles_s, lost_at_s], |seen| seen.k_1)))
             .collect();
         let large = swings.iter().filter(|swing| swing.deviation >= SWINGS_NM);
-        let periods: Vec<f64> = large.filter_map(|swing| swing.period_s).collect();
         Pair {
             law: 0,
             driver: 0,
@@ -316,7 +315,7 @@ impl<'k> Adaptation<'k> {
                 (own.iter().zip(first)).map(|(own, first)| Some(k_hg(own, behind)? - k_hg(first, behind)?)),
             ),
             swing_nm: mean_of(swings.iter().map(|swing| Some(swing.deviation))),
-            period_s: (!periods.is_empty()).then(|| periods.iter().sum::<f64>() / periods.len() as f64),
+            period_s: mean(large.filter_map(|swing| swing.period_s)),
             ended: 0,
             series: own.first().map_or_else(Vec::new, |drive| drive.series.clone()),
         }

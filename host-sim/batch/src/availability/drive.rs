@@ -12,7 +12,7 @@ use haptic_sim::scenario::Condition;
 use haptic_sim::simulation::{Ending, Run, SAMPLE_RATE_HZ};
 use haptic_sim::worlds::Happens;
 use haptic_sim::{Action, Outcome, Scenario, Simulation};
-use haptic_vectorised::{Event, Options};
+use haptic_vectorised::Options;
 
 use super::events::Eventful;
 use super::{ByHand, Declaration, DriveSegment, SEGMENT_S, SegmentNumber};
@@ -60,45 +60,33 @@ pub(super) fn side_by_side(
         first: first as u64,
         checked: Checked::new(root, of as u64),
     };
-    let mut hands: Vec<Option<ByHand>> = vec![None; segments.len()];
-    let rejected = group(&manual).run_batch(
-        options,
-        |place| by_hand(&guided[place]),
-        |place, event| {
-            if let Event::Ended(run) = event {
-                hands[place] = Some(ByHand::new(run));
-            }
-            Ok(())
-        },
-    )?;
-    for place in rejected {
-        hands[place] = Some(ByHand::new(&by_hand(&guided[place])));
-    }
-    let hands: Vec<ByHand> = hands.into_iter().flatten().collect();
-    let rejected = group(&guided).run_batch(
-        options,
-        |place| with_ecu(&guided[place], Happens::default()).0,
-        |place, event| match event {
-            Event::Ended(run) => {
-                let reported = Reported {
-                    mode: Mode::Active,
-                    active: run.steps,
-                    declarations: Vec::new(),
-                };
-                done(
-                    place,
-                    segments[place].segment(&guided[place], run, reported, hands[place]),
-                )
-            }
-            _ => Ok(()),
-        },
-    )?;
-    rejected.into_iter().try_for_each(|place| {
-        let (run, reported) = with_ecu(&guided[place], Happens::default());
+    let hand = |place: usize| by_hand(&guided[place]);
+    let hands = group(&manual).measured(options, hand, |_, run| Ok(ByHand::new(run)))?;
+    let hands: Vec<ByHand> = (hands.into_iter().enumerate())
+        .map(|(place, found)| found.unwrap_or_else(|| ByHand::new(&hand(place))))
+        .collect();
+    let mut judge = |place: usize, run: &Run, reported| {
         done(
             place,
-            segments[place].segment(&guided[place], &run, reported, hands[place]),
+            segments[place].segment(&guided[place], run, reported, hands[place]),
         )
+    };
+    let ecu = |place: usize| with_ecu(&guided[place], Happens::default());
+    let judged = group(&guided).measured(
+        options,
+        |place| ecu(place).0,
+        |place, run| {
+            let reported = Reported {
+                active: run.steps,
+                ..Reported::new()
+            };
+            judge(place, run, reported)
+        },
+    )?;
+    let rejected = (0..judged.len()).filter(|place| judged[*place].is_none());
+    rejected.into_iter().try_for_each(|place| {
+        let (run, reported) = ecu(place);
+        judge(place, &run, reported)
     })
 }
 
@@ -184,16 +172,22 @@ pub(crate) struct Reported {
     pub(crate) declarations: Vec<Declaration>,
 }
 
+impl Reported {
+    fn new() -> Self {
+        Self {
+            mode: Mode::Active,
+            active: 0,
+            declarations: Vec::new(),
+        }
+    }
+}
+
 impl Watch {
     pub(crate) fn new() -> Self {
         Self {
             receiver: ReceiverState::TRUSTED,
             said: None,
-            reported: Reported {
-                mode: Mode::Active,
-                active: 0,
-                declarations: Vec::new(),
-            },
+            reported: Reported::new(),
             faults: FaultSet::NONE,
             away: None,
             steps: 0,

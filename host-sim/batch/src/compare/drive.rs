@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use super::Faults;
 use crate::Away;
+use crate::statistics::mean;
 
 /// A figure that laws are compared by.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -197,11 +198,7 @@ fn values(metrics: &Metrics, off_road: bool, failed: &[Vec<After>; 2]) -> [Optio
         return values;
     }
     let worst = |failed: &[After]| failed.iter().map(|after| after.peak_m).reduce(f64::max);
-    let mean =
-        |values: &[f64]| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
     let [losses, silences] = failed;
-    let peaks: Vec<f64> = losses.iter().map(|after| after.peak_m).collect();
-    let behind: Vec<f64> = losses.iter().filter_map(|after| after.mean_m).collect();
     // A drive without conflict has no torque in conflict.
     let against_nm = metrics
         .conflict_time_share
@@ -215,8 +212,8 @@ fn values(metrics: &Metrics, off_road: bool, failed: &[Vec<After>; 2]) -> [Optio
         metrics.conflict_time_share,
         against_nm,
         worst(losses),
-        mean(&peaks),
+        mean(losses.iter().map(|after| after.peak_m)),
         worst(silences),
-        mean(&behind),
+        mean(losses.iter().filter_map(|after| after.mean_m)),
     ]
 }

@@ -11,7 +11,7 @@ use super::drive::METRICS;
 use super::parts::{parts, unknown};
 use super::{Compare, Drives, Faults, Kinds, Tuning};
 use crate::files::{Source, one};
-use crate::study::check_names;
+use crate::study::{check_names, merge};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,20 +25,12 @@ struct File {
     #[serde(default)]
     scenario: Table,
     #[serde(default)]
-    faults: FaultsFile,
+    faults: Faults,
     tuning: Option<TuningFile>,
     #[serde(default)]
     world: Vec<WorldFile>,
     law: Vec<Table>,
     driver: Vec<Table>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields, default)]
-struct FaultsFile {
-    sudden_loss: u64,
-    silent_lane: u64,
-    lasts_s: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -67,16 +59,13 @@ const WEIGHTS: [&str; 3] = [
 ];
 /// Most drives of a comparison.
 const MOST_DRIVES: f64 = 1e6;
-/// How long a failed drive goes on if a file says nothing, s.
-const LASTS_S: f64 = 15.0;
-
 pub(super) fn from_text<'k>(
     source: &Source,
     text: &str,
     kinds: &'k Kinds,
 ) -> Result<Compare<'k>, InputError> {
     let file: File = parse_toml(&source.name, text)?;
-    check_names("comparison", [&file.name]).map_err(|e| source.bad(e))?;
+    check_names(source, "comparison", [&file.name])?;
     let (tables, oracles) = oracles(source, &file.law)?;
     let laws = parts(source, "law", &tables, &kinds.laws)?;
     let drivers = parts(source, "driver", &file.driver, &kinds.drivers)?;
@@ -86,11 +75,13 @@ pub(super) fn from_text<'k>(
         .as_ref()
         .map(|t| tuning(source, &file.scenario, t))
         .transpose()?;
-    let faults = Faults {
-        sudden_loss: source.count("faults.sudden_loss", file.faults.sudden_loss, 0.0, 1000.0)?,
-        silent_lane: source.count("faults.silent_lane", file.faults.silent_lane, 0.0, 1000.0)?,
-        lasts_s: file.faults.lasts_s.unwrap_or(LASTS_S),
-    };
+    let faults = file.faults;
+    for (field, count) in [
+        ("sudden_loss", faults.sudden_loss),
+        ("silent_lane", faults.silent_lane),
+    ] {
+        source.within(&format!("faults.{field}"), f64::from(count), 0.0, 1000.0, "")?;
+    }
     source.within("faults.lasts_s", faults.lasts_s, 1.0, 600.0, "s")?;
     let compare = Compare {
         name: file.name,
@@ -128,19 +119,14 @@ fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputEr
         return Ok((vec![String::new()], drives(source, &file.scenario)?));
     }
     let names: Vec<String> = file.world.iter().map(|world| world.name.clone()).collect();
-    check_names("world", &names).map_err(|e| source.bad(e))?;
+    check_names(source, "world", &names)?;
     let mut all = Drives {
         places: Vec::new(),
         seeds: 0,
     };
     for world in &file.world {
         let mut fields = file.scenario.clone();
-        for (name, value) in &world.scenario {
-            match (fields.get_mut(name), value) {
-                (Some(Value::Table(fields)), Value::Table(own)) => fields.extend(own.clone()),
-                _ => _ = fields.insert(name.clone(), value.clone()),
-            }
-        }
+        merge(&mut fields, &world.scenario);
         let source = Source::new(format!("{}: world {}", source.name, world.name), source.folder);
         let made = drives(&source, &fields)?;
         all.places.extend(made.places);
@@ -167,13 +153,10 @@ fn check_parts(source: &Source, compare: &Compare) -> Result<(), InputError> {
     )?;
     let (_, _, scenario) = &compare.judged.places[0];
     for law in &compare.laws {
-        law.make(scenario, &law.untuned())
-            .map_err(|e| source.bad(format!("law {}: {e}", law.name)))?;
+        law.check("law", source, scenario)?;
     }
     for driver in &compare.drivers {
-        driver
-            .make(scenario, &driver.untuned())
-            .map_err(|e| source.bad(format!("driver {}: {e}", driver.name)))?;
+        driver.check("driver", source, scenario)?;
     }
     Ok(())
 }

@@ -26,6 +26,7 @@ use haptic_sim::laws::{LAWS, Law};
 use haptic_sim::scenario::{Scenario, ScenarioError};
 use haptic_sim::seeds::named;
 use rayon::prelude::*;
+use serde::Deserialize;
 
 use crate::files::Source;
 
@@ -90,6 +91,17 @@ impl<'k, P: ?Sized> Chosen<'k, P> {
         }
     }
 
+    /// As it is made untuned; refused in words that name it as the file does.
+    pub(crate) fn check(
+        &self,
+        what: &str,
+        source: &Source,
+        scenario: &Scenario,
+    ) -> Result<Box<P>, InputError> {
+        let made = self.make(scenario, &self.untuned());
+        made.map_err(|e| source.bad(format!("{what} {}: {e}", self.name)))
+    }
+
     pub(crate) fn make(&self, scenario: &Scenario, values: &[f64]) -> Result<Box<P>, ScenarioError> {
         let mut made = match self.kind.make {
             Make::Part(make) => make(scenario, values)?,
@@ -127,7 +139,8 @@ pub struct Tuning {
 }
 
 /// What fails in the judged drives.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Faults {
     /// Instants of a sudden loss of the torque, evenly over the drive.
     pub sudden_loss: u32,
@@ -137,12 +150,14 @@ pub struct Faults {
     pub lasts_s: f64,
 }
 
-impl Faults {
-    const NONE: Self = Self {
-        sudden_loss: 0,
-        silent_lane: 0,
-        lasts_s: 0.0,
-    };
+impl Default for Faults {
+    fn default() -> Self {
+        Self {
+            sudden_loss: 0,
+            silent_lane: 0,
+            lasts_s: 15.0,
+        }
+    }
 }
 
 /// A comparison, checked.

@@ -17,7 +17,7 @@ pub(crate) fn parts<'k, P: ?Sized>(
 ) -> Result<Vec<Chosen<'k, P>>, InputError> {
     let chosen = tables.iter().map(|table| part(source, what, table, kinds));
     let chosen = chosen.collect::<Result<Vec<_>, _>>()?;
-    check_names(what, chosen.iter().map(|c| &c.name)).map_err(|e| source.bad(e))?;
+    check_names(source, what, chosen.iter().map(|c| &c.name))?;
     Ok(chosen)
 }
 

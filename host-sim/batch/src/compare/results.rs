@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::drive::{Driven, METRICS, Metric};
 use super::tune::Tuned;
 use super::{Compare, Faults, Job};
+use crate::entries::{Entry, EntryKind};
 use crate::study::interval_of_mean;
 
 /// A mean with its interval.
@@ -113,27 +114,12 @@ pub struct CompareResults {
 impl CompareResults {
     /// The table of drives, with a row each.
     pub fn to_csv(&self) -> String {
-        let names = METRICS.map(|metric| metric.name).join(",");
-        let mut text = format!(
-            "law,driver,world,road,speed_kmh,seed,{names},off_road,guidance_left_by_itself,failed_off_road\n"
-        );
+        let names: Vec<&str> = columns().map(|(name, _)| name).collect();
+        let mut text = names.join(",") + "\n";
         for row in &self.rows {
-            let Driven {
-                values,
-                off_road,
-                left_by_itself,
-                failed_off_road,
-            } = &row.driven;
-            let values = values
-                .map(|value| value.map_or(String::new(), |value| value.to_string()))
-                .join(",");
-            let (off_road, left) = (u8::from(*off_road), u8::from(*left_by_itself));
             // A road's name may have a comma in it.
-            let names = row.names.each_ref().map(|name| name.replace(',', ";")).join(",");
-            text += &format!(
-                "{names},{},{},{values},{off_road},{left},{failed_off_road}\n",
-                row.speed_kmh, row.seed
-            );
+            let entries = row.entries().map(|entry| entry.to_string().replace(',', ";"));
+            text += &(entries.collect::<Vec<_>>().join(",") + "\n");
         }
         text
     }
@@ -144,38 +130,46 @@ impl CompareResults {
     /// What the file system says.
     #[cfg(feature = "parquet")]
     pub fn write_parquet(&self, file: std::fs::File) -> std::io::Result<()> {
-        use crate::parquet::{Cell, ParquetColumn, Table};
-        let (number, whole) = (
-            || ParquetColumn::Number(Vec::new()),
-            || ParquetColumn::Whole(Vec::new()),
-        );
-        let texts = ["law", "driver", "world", "road"].map(|name| (name, ParquetColumn::Text(Vec::new())));
-        let metrics = METRICS.map(|metric| (metric.name, number()));
-        let flags =
-            ["off_road", "guidance_left_by_itself"].map(|name| (name, ParquetColumn::Flag(Vec::new())));
-        let columns = texts
-            .into_iter()
-            .chain([("speed_kmh", number()), ("seed", whole())])
-            .chain(metrics)
-            .chain(flags)
-            .chain([("failed_off_road", whole())]);
-        let columns = columns.map(|(name, column)| (name.to_owned(), column));
+        let columns = columns().map(|(name, kind)| (name.to_owned(), kind));
         let metadata = [
             ("haptic.version", crate::VERSION),
             ("haptic.comparison", &self.name),
         ];
-        let mut table = Table::create(columns, &metadata, file)?;
+        let mut table = crate::parquet::Table::create(columns, &metadata, file)?;
         for row in &self.rows {
-            let texts = row.names.iter().map(|name| Cell::Text(name.clone()));
-            let driven = &row.driven;
-            let cells = texts
-                .chain([Cell::Number(Some(row.speed_kmh)), Cell::Whole(row.seed.into())])
-                .chain(driven.values.map(Cell::Number))
-                .chain([driven.off_road, driven.left_by_itself].map(Cell::Flag))
-                .chain([Cell::Whole(driven.failed_off_road.into())]);
-            table.row(cells)?;
+            table.row(row.entries())?;
         }
         table.finish()
+    }
+}
+
+/// The columns of the table of drives.
+fn columns() -> impl Iterator<Item = (&'static str, EntryKind)> {
+    use EntryKind::{Flag, Number, Text, Whole};
+    let names = ["law", "driver", "world", "road"].map(|name| (name, Text));
+    let metrics = METRICS.map(|metric| (metric.name, Number));
+    let flags = ["off_road", "guidance_left_by_itself"].map(|name| (name, Flag));
+    names
+        .into_iter()
+        .chain([("speed_kmh", Number), ("seed", Whole)])
+        .chain(metrics)
+        .chain(flags)
+        .chain([("failed_off_road", Whole)])
+}
+
+impl DriveRow {
+    /// In the order of the columns.
+    fn entries(&self) -> impl Iterator<Item = Entry<'_>> {
+        let driven = &self.driven;
+        let names = self.names.iter().map(|name| Entry::Text(name.clone()));
+        names
+            .chain([
+                Entry::Number(Some(self.speed_kmh)),
+                Entry::Whole(self.seed.into()),
+            ])
+            .chain(driven.values.map(Entry::Number))
+            .chain([driven.off_road, driven.left_by_itself].map(Entry::Flag))
+            .chain([Entry::Whole(driven.failed_off_road.into())])
     }
 }
 

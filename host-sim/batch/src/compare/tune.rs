@@ -54,7 +54,7 @@ pub(super) fn tune(compare: &Compare, progress: &(impl Fn() + Sync)) -> Result<V
         return Ok((0..all.len()).map(untuned).collect());
     };
     let jobs = compare.jobs(&tuning.drives, |law| all[law].len());
-    let driven = compare.drive(&jobs, &all, &tuning.drives, "tuning", Faults::NONE, progress)?;
+    let driven = compare.drive(&jobs, &all, &tuning.drives, "tuning", Faults::default(), progress)?;
     let drivers = compare.drivers.len();
     let of_driver = tuning.drives.places.len() * tuning.drives.seeds as usize;
     let mean = |group: &[Driven]| {

@@ -12,6 +12,7 @@ use super::{DesignGuidance, Gains, Member, Stage, published};
 use crate::compare::{Faults, failures, measured, seed_of};
 use crate::error::StudyError;
 use crate::stability::growth;
+use crate::statistics::rms;
 use crate::vectorised::run_all;
 
 /// What a set does with a driver, means over places and seeds: peak lateral error to the middle of the lane (m), mean of the size of T_d
@@ -167,12 +168,8 @@ fn noise_nm(run: &Run) -> f64 {
     let torque: Vec<f64> = run.trace.samples.iter().map(|s| s.guidance_torque_nm).collect();
     let slow = zero_phase_low_pass(&torque, run.trace.sample_rate_hz, NOISE_HZ);
     let slow = slow.unwrap_or_else(|| torque.clone());
-    let squares: f64 = torque
-        .iter()
-        .zip(&slow)
-        .map(|(all, slow)| (all - slow).powi(2))
-        .sum();
-    (squares / torque.len().max(1) as f64).sqrt()
+    let fast = torque.iter().zip(&slow).map(|(all, slow)| all - slow);
+    rms(fast).unwrap_or(0.0)
 }
 
 /// Of drives, each followed by its losses: the mean, a drive's loss being its worst.

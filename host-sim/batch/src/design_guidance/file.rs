@@ -63,7 +63,7 @@ pub(super) fn from_text(
     own_line_share: Option<f64>,
 ) -> Result<DesignGuidance, InputError> {
     let file: File = parse_toml(&source.name, text)?;
-    check_names("design", [&file.name]).map_err(|e| source.bad(e))?;
+    check_names(source, "design", [&file.name])?;
     if file.law != "paper" {
         return Err(source.bad(unknown("law", &file.law, ["paper"].into_iter())));
     }

@@ -17,6 +17,7 @@ use super::drives::{driven_by, guided};
 use super::repetitions::{COMPARED, Compared, bound_of, compared};
 use super::{ExperimentPlan, PublishedDriver};
 use crate::error::StudyError;
+use crate::statistics::rms;
 
 /// How many 95 % intervals of identified values hold the truth.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -171,8 +172,7 @@ pub fn corruptions(
             Ok((fits, bound.unwrap_or_default()))
         })
         .collect::<Result<Vec<_>, StudyError>>()?;
-    let count = found.len().max(1) as f64;
-    let bound = std::array::from_fn(|i| (found.iter().map(|f| f.1[i].powi(2)).sum::<f64>() / count).sqrt());
+    let bound = std::array::from_fn(|i| rms(found.iter().map(|f| f.1[i])).unwrap_or(0.0));
     let mut fits: Vec<Vec<_>> = ways.iter().map(|_| Vec::new()).collect();
     for (each, _) in found {
         for (line, fit) in fits.iter_mut().zip(each) {
@@ -229,10 +229,8 @@ impl CorruptionLine {
                 None => causes.push((cause, 1)),
             }
         }
-        let rms = std::array::from_fn(|i| {
-            let sum: f64 = found.iter().map(|f| error(&f.0[i]).powi(2)).sum();
-            (sum / found.len().max(1) as f64).sqrt()
-        });
+        // As the sum of nothing is.
+        let rms = std::array::from_fn(|i| rms(found.iter().map(|f| error(&f.0[i]))).unwrap_or(-0.0));
         Self {
             corrupted_by: name,
             drives: found.len(),

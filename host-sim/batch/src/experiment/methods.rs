@@ -13,6 +13,7 @@ use super::corruption::{Corruption, POPULATION, corrupted_log};
 use super::drives::{driven, guided};
 use super::repetitions::{COMPARED, bound_of, compared};
 use crate::error::StudyError;
+use crate::statistics::rms;
 
 /// The ways.
 pub const METHODS: [&str; 4] = ["none", "plain smoother", "default", "published"];
@@ -89,10 +90,6 @@ pub fn methods(plan: &ExperimentPlan, seeds: u32, done: impl Fn() + Sync) -> Res
             Ok((bound, values))
         })
         .collect::<Result<Vec<_>, StudyError>>()?;
-    let root_mean = |values: &mut dyn Iterator<Item = f64>| {
-        let (sum, n) = values.fold((0.0, 0), |(s, n), x| (s + x * x, n + 1));
-        (sum / f64::from(n.max(1))).sqrt()
-    };
     let mut lines = Vec::new();
     for (n, (noise, _)) in noises.iter().enumerate() {
         for (m, method) in METHODS.iter().enumerate() {
@@ -110,9 +107,10 @@ pub fn methods(plan: &ExperimentPlan, seeds: u32, done: impl Fn() + Sync) -> Res
                 method,
                 drives: here.len(),
                 rms: std::array::from_fn(|i| {
-                    root_mean(&mut here.iter().filter_map(|h| Some(h[i].1.optimum? - h[i].2)))
+                    let errors = here.iter().filter_map(|h| Some(h[i].1.optimum? - h[i].2));
+                    rms(errors).unwrap_or(0.0)
                 }),
-                bound: std::array::from_fn(|i| root_mean(&mut found.iter().map(|f| f.0[i]))),
+                bound: std::array::from_fn(|i| rms(found.iter().map(|f| f.0[i])).unwrap_or(0.0)),
                 coverage: (all > 0).then(|| f64::from(held as u32) / f64::from(all)),
             });
         }

@@ -53,6 +53,7 @@ use crate::vectorised::run_all;
 pub use drives::recorded;
 use drives::{Driven, scenario_of_drive};
 pub(crate) use drives::{guided_drive, log_each};
+pub(crate) use repetitions::compared;
 
 /// Standard deviation of the remnant in manual driving, N.m.
 pub const REMNANT_MANUAL_NM: f64 = 0.097;

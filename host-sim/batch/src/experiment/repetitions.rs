@@ -8,12 +8,13 @@ use serde::Serialize;
 use super::drives::{guided, log_each, scenario_of_drive};
 use super::{ExperimentPlan, PublishedDriver, truth_of};
 use crate::error::StudyError;
+use crate::statistics::{mean, rms};
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
 };
 
 /// What is compared with the truth: the parameters that a torque record can carry.
-pub(super) const COMPARED: usize = 5;
+pub(crate) const COMPARED: usize = 5;
 
 /// What the repetitions found.
 #[derive(Debug, Clone, Serialize)]
@@ -136,9 +137,9 @@ pub(super) fn bound_of(log: &DriveLog, truth: &PublishedDriver) -> [f64; COMPARE
 }
 
 /// A parameter's key, what was found, and the truth.
-pub(super) type Compared = (&'static str, Parameter, f64);
+pub(crate) type Compared = (&'static str, Parameter, f64);
 
-pub(super) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
+pub(crate) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
     let sum = truth.k_d + Muscle::default().k_nms;
     [
         ("gain_1", found.gain_1, sum * truth.a_1),
@@ -153,13 +154,12 @@ impl Repeated {
     /// Of at least one drive.
     fn new(participant: Option<u32>, i: usize, judged: &[DriveResult]) -> Self {
         let drives: Vec<Compared> = judged.iter().map(|j| j.values[i]).collect();
-        let bound = judged.iter().map(|j| j.bound[i].powi(2)).sum::<f64>() / judged.len() as f64;
         let at_t_nms = judged.iter().filter(|j| j.held_at_t_nms[i]).count();
-        let errors: Vec<f64> = drives
-            .iter()
-            .filter_map(|(_, found, truth)| Some(found.estimate? - truth))
-            .collect();
-        let standard_errors: Vec<f64> = drives.iter().filter_map(|d| d.1.standard_error).collect();
+        let errors = || {
+            drives
+                .iter()
+                .filter_map(|(_, found, truth)| Some(found.estimate? - truth))
+        };
         let covered = drives.iter().filter(|(_, found, truth)| {
             // An interval that the data do not bound holds everything.
             found
@@ -167,20 +167,17 @@ impl Repeated {
                 .is_none_or(|[low, high]| low <= *truth && *truth <= high)
         });
         let share = |count: usize| count as f64 / drives.len() as f64;
-        let mean =
-            |values: &[f64]| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
-        let squares: Vec<f64> = errors.iter().map(|e| e * e).collect();
         Self {
             participant,
             parameter: drives[0].0,
             drives: drives.len(),
             identified: share(drives.iter().filter(|d| d.1.identified).count()),
             coverage: share(covered.count()),
-            bias: mean(&errors),
-            rms: mean(&squares).map(f64::sqrt),
-            largest: errors.iter().map(|e| e.abs()).reduce(f64::max),
-            standard_error: mean(&standard_errors),
-            bound: bound.sqrt(),
+            bias: mean(errors()),
+            rms: rms(errors()),
+            largest: errors().map(f64::abs).reduce(f64::max),
+            standard_error: mean(drives.iter().filter_map(|d| d.1.standard_error)),
+            bound: rms(judged.iter().map(|j| j.bound[i])).unwrap_or(f64::NAN),
             coverage_at_t_nms: share(at_t_nms),
         }
     }

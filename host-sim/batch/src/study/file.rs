@@ -10,7 +10,6 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{Order, Session, Study, Subject};
-use crate::error::{StudyError, refuse};
 use crate::experiment::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
 use crate::files::{Source, one};
 
@@ -55,10 +54,9 @@ const LONGEST_NAME: usize = 40;
 
 pub(super) fn from_text(source: &Source, text: &str) -> Result<Study, InputError> {
     let file: StudyFile = parse_toml(&source.name, text)?;
-    let named = |error: StudyError| source.bad(error);
-    check_names("study", [&file.name]).map_err(named)?;
-    check_names("condition", file.condition.iter().map(|c| &c.name)).map_err(named)?;
-    check_names("participant", file.participant.iter().map(|p| &p.name)).map_err(named)?;
+    check_names(source, "study", [&file.name])?;
+    check_names(source, "condition", file.condition.iter().map(|c| &c.name))?;
+    check_names(source, "participant", file.participant.iter().map(|p| &p.name))?;
     let repetitions = source.count("repetitions", file.repetitions, 1.0, MOST_REPETITIONS)?;
     let rows = file.order.rows(file.condition.len());
     let mut sessions = Vec::new();
@@ -93,24 +91,25 @@ pub(super) fn from_text(source: &Source, text: &str) -> Result<Study, InputError
 }
 
 pub(crate) fn check_names<'a>(
+    source: &Source,
     what: &str,
     names: impl IntoIterator<Item = &'a String>,
-) -> Result<(), StudyError> {
+) -> Result<(), InputError> {
     let mut seen = BTreeSet::new();
     for name in names {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) {
-            return refuse(format!(
+            return Err(source.bad(format!(
                 "{what} {name:?}: a name is 1 to {LONGEST_NAME} letters, digits, - and _, for a directory bears it"
-            ));
+            )));
         }
         // Some disks do not tell large letters from small ones.
         if !seen.insert(name.to_lowercase()) {
-            return refuse(format!("{what} {name:?} is there twice"));
+            return Err(source.bad(format!("{what} {name:?} is there twice")));
         }
     }
     if seen.is_empty() {
-        return refuse(format!("there is no [[{what}]]"));
+        return Err(source.bad(format!("there is no [[{what}]]")));
     }
     Ok(())
 }
@@ -206,7 +205,7 @@ fn of_published(number: u32, manual: bool) -> Result<Table, RangeError> {
 }
 
 /// Puts fields over others, tables field by field.
-fn merge(into: &mut Table, over: &Table) {
+pub(crate) fn merge(into: &mut Table, over: &Table) {
     for (name, value) in over {
         match (into.get_mut(name), value) {
             // A course is one value.

@@ -23,7 +23,7 @@ use haptic_sim::scenario::{Condition, Scenario};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use file::check_names;
+pub(crate) use file::{check_names, merge};
 pub use order::Order;
 pub(crate) use paired::interval_of_mean;
 pub use paired::{Difference, of_participants};

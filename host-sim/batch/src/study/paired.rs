@@ -10,6 +10,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::SessionResult;
+use crate::statistics::mean;
 
 /// One metric under two conditions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -42,7 +43,7 @@ pub fn of_participants(sessions: &[SessionResult], condition: &str, metric: &Def
         let values = records
             .filter(|r| !r.diverged)
             .filter_map(|r| (metric.value)(&r.metrics));
-        mean_of(&values.collect::<Vec<_>>())
+        mean(values)
     };
     let each = sessions.chunk_by(|a, b| a.participant == b.participant);
     each.map(of_one).collect()
@@ -76,10 +77,6 @@ pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> 
     all
 }
 
-fn mean_of(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
 /// Mean and its 95 % interval, Student's; none of a single value.
 pub(crate) fn interval_of_mean(values: &[f64]) -> Option<(f64, Option<[f64; 2]>)> {
     paired(values).map(|(mean, interval, _)| (mean, interval))
@@ -87,7 +84,7 @@ pub(crate) fn interval_of_mean(values: &[f64]) -> Option<(f64, Option<[f64; 2]>)
 
 /// Mean, its interval and d_z of differences.
 fn paired(differences: &[f64]) -> Option<(f64, Option<[f64; 2]>, Option<f64>)> {
-    let mean = mean_of(differences)?;
+    let mean = mean(differences.iter().copied())?;
     let freedom = differences.len() as f64 - 1.0;
     let square: f64 = differences.iter().map(|value| (value - mean).powi(2)).sum();
     let deviation = (square / freedom).sqrt();

@@ -26,11 +26,11 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// How many values a list or a choice has; none of a distribution.
-    pub(super) fn rows(&self) -> Option<usize> {
+    /// The values of a list or a choice; none of a distribution.
+    pub(super) fn rows(&self) -> Option<&[Vec<Value>]> {
         match &self.kind {
-            Kind::Grid(rows) => Some(rows.len()),
-            Kind::Sampled(distribution) => distribution.rows().map(<[_]>::len),
+            Kind::Grid(rows) => Some(rows),
+            Kind::Sampled(distribution) => distribution.rows(),
         }
     }
 }

@@ -109,7 +109,7 @@ impl Effects {
     pub(super) fn new(sweep: &Sweep, judge: usize) -> Self {
         let mut column = 0;
         let axis = |axis: &super::axis::Axis| {
-            let of_list = axis.rows();
+            let of_list = axis.rows().map(<[_]>::len);
             let rows = of_list.unwrap_or(SLICES as usize);
             let first = column;
             column += axis.columns.len();
@@ -347,7 +347,7 @@ mod tests {
         );
         let folder = tempfile::tempdir().unwrap();
         let store = crate::sweep::Store::open(&sweep, "test 1", folder.path()).unwrap();
-        crate::sweep::run_all(&store, &sweep, crate::sweep::Shard::WHOLE, 1, |_| ()).unwrap();
+        crate::sweep::run_all(&store, &sweep, crate::sweep::Shard::WHOLE, Some(1), |_| ()).unwrap();
         let summary = store.finish().unwrap();
         assert_eq!(summary.compare.as_deref(), Some("failure.kind"));
         let csv = std::fs::read_to_string(folder.path().join("drives.csv")).unwrap();

@@ -9,6 +9,7 @@ use super::axis::{Axis, Column, Kind};
 use super::value::Distribution;
 use super::vary::varied;
 use crate::error::{StudyError, refuse};
+use crate::files::one;
 
 /// How sampled fields are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -88,10 +89,6 @@ pub(super) struct SweepFile {
     /// Courses by the name that scenarios give them, where the text needs no other file.
     #[serde(default)]
     pub courses: Table,
-}
-
-fn one() -> u64 {
-    1
 }
 
 /// Fields that vary together: rows of a CSV file, or of the text.

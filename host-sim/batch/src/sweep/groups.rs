@@ -62,10 +62,15 @@ impl Moments {
         (self.count > 0).then_some(self.mean)
     }
 
+    /// Divisor n - 1; none of fewer than two.
+    pub(super) fn variance(&self) -> Option<f64> {
+        (self.count > 1).then(|| self.squares / (self.count as f64 - 1.0))
+    }
+
     /// Variance of the mean, and its degrees of freedom; none of fewer than two.
     pub(super) fn of_mean(&self) -> Option<(f64, f64)> {
-        let (count, free) = (self.count as f64, self.count as f64 - 1.0);
-        (self.count > 1).then(|| (self.squares / free / count, free))
+        let count = self.count as f64;
+        Some((self.variance()? / count, count - 1.0))
     }
 }
 

@@ -19,8 +19,6 @@ mod drive;
 mod effects;
 mod file;
 mod groups;
-#[cfg(feature = "parquet")]
-mod parquet;
 mod point;
 mod resolve;
 mod run;
@@ -32,7 +30,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod units;
-mod value;
+pub(crate) mod value;
 mod vary;
 mod vectorised;
 
@@ -258,7 +256,7 @@ impl Sweep {
                 all.join(", ")
             ));
         };
-        match self.axes().nth(place).and_then(Axis::rows) {
+        match self.axes().nth(place).and_then(Axis::rows).map(<[_]>::len) {
             Some(2..=MOST_COMPARED) => Ok(place),
             Some(rows) => refuse(format!(
                 "compare = {field:?}: has {rows} values, 2 to {MOST_COMPARED} can be told apart"

@@ -8,7 +8,6 @@ use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::scenario::Scenario;
 use toml::{Table, Value};
 
-use super::axis::Kind;
 use super::file::SweepFile;
 use super::value;
 use crate::files::{self, Source, load_lane};
@@ -99,10 +98,6 @@ fn base(name: &str, file: &SweepFile, folder: &Path) -> Result<Table, InputError
 fn courses_of(name: &str, file: &SweepFile, scenario: &Table) -> Result<Vec<String>, InputError> {
     let mut names: Vec<Value> = scenario.get("course").cloned().into_iter().collect();
     for axis in file.axes(name)? {
-        let rows = match &axis.kind {
-            Kind::Grid(rows) => Some(rows.as_slice()),
-            Kind::Sampled(distribution) => distribution.rows(),
-        };
         let Some(at) = axis
             .columns
             .iter()
@@ -110,7 +105,7 @@ fn courses_of(name: &str, file: &SweepFile, scenario: &Table) -> Result<Vec<Stri
         else {
             continue;
         };
-        names.extend(rows.into_iter().flatten().map(|row| row[at].clone()));
+        names.extend(axis.rows().into_iter().flatten().map(|row| row[at].clone()));
     }
     Ok(names
         .iter()

@@ -1,11 +1,14 @@
 //! A shard's chunks on threads, with progress; and when enough is known.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
 
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use super::groups::Moments;
 use super::{Chunk, Store, Sweep};
+use crate::compare::on_threads;
 use crate::error::{StudyError, refuse};
 
 /// A part of a sweep: every n-th chunk.
@@ -60,7 +63,7 @@ pub struct Progress {
     pub all: u64,
 }
 
-/// Drives what is missing of a shard on so many threads; `progress` is called behind each chunk.
+/// Drives what is missing of a shard on so many threads, none: one a core; `progress` is called behind each chunk.
 ///
 /// # Errors
 /// A drive that cannot be; what the disk says. Chunks that were finished stay.
@@ -68,7 +71,7 @@ pub fn run_all(
     store: &Store,
     sweep: &Sweep,
     shard: Shard,
-    threads: usize,
+    threads: Option<u32>,
     progress: impl Fn(Progress) + Sync,
 ) -> Result<(), StudyError> {
     let count = |chunk: u64| {
@@ -81,58 +84,41 @@ pub fn run_all(
         .sum();
     let missing = store.missing(shard);
     let before = all - missing.iter().copied().map(count).sum::<u64>();
-    let state = Mutex::new(Progress {
+    let begin = Progress {
         done: before,
         before,
         all,
-    });
-    let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let prefix = Mutex::new(Prefix {
-        watch: Watch::new(sweep),
-        next: 0,
-    });
-    progress(Progress {
-        done: before,
-        before,
-        all,
-    });
-    let work = || -> Result<(), StudyError> {
-        while !stopped.load(Ordering::Relaxed) {
-            let Some(number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else {
-                break;
-            };
-            let chunk = sweep.run_chunk(*number)?;
-            store.put(*number, &chunk.to_bytes(store.fingerprint()))?;
-            let mut now = state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-            now.done += chunk.rows.len() as u64;
-            progress(*now);
-            drop(now);
-            if sweep.stop.is_some() {
-                let mut prefix = prefix.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                if prefix.advance(store) {
-                    stopped.store(true, Ordering::Relaxed);
-                }
-            }
-        }
-        Ok(())
     };
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.max(1))
-            .map(|_| {
-                scope.spawn(|| {
-                    let result = work();
-                    if result.is_err() {
-                        stopped.store(true, Ordering::Relaxed);
-                    }
-                    result
-                })
-            })
-            .collect();
-        let results: Vec<_> = workers.into_iter().map(|worker| worker.join()).collect();
-        results
-            .into_iter()
-            .try_for_each(|result| result.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    })
+    progress(begin);
+    let state = Mutex::new((
+        begin,
+        Prefix {
+            watch: Watch::new(sweep),
+            next: 0,
+        },
+    ));
+    // Whether enough is known.
+    let drive = |number: u64| -> Result<bool, StudyError> {
+        let chunk = sweep.run_chunk(number)?;
+        store.put(number, &chunk.to_bytes(store.fingerprint()))?;
+        let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+        let (now, prefix) = &mut *state;
+        now.done += chunk.rows.len() as u64;
+        progress(*now);
+        Ok(sweep.stop.is_some() && prefix.advance(store))
+    };
+    let chunks = missing.into_iter().par_bridge();
+    let driven = on_threads(threads, || {
+        chunks.try_for_each(|number| match drive(number) {
+            Ok(false) => ControlFlow::Continue(()),
+            Ok(true) => ControlFlow::Break(Ok(())),
+            Err(error) => ControlFlow::Break(Err(error)),
+        })
+    });
+    match driven.map_err(|e| e.to_string())? {
+        ControlFlow::Break(Err(error)) => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// The chunks from the first on without a gap, whoever drove them.
@@ -165,9 +151,7 @@ pub(super) struct Watch {
     next_drive: u64,
     sum: f64,
     with_value: u64,
-    count: u64,
-    mean: f64,
-    squares: f64,
+    observed: Moments,
 }
 
 impl Watch {
@@ -188,9 +172,7 @@ impl Watch {
             next_drive: 0,
             sum: 0.0,
             with_value: 0,
-            count: 0,
-            mean: 0.0,
-            squares: 0.0,
+            observed: Moments::default(),
         }
     }
 
@@ -207,18 +189,13 @@ impl Watch {
                 self.observe();
             }
         }
-        let variance = self.squares / (self.count.max(2) - 1) as f64;
-        self.count >= self.least && self.quantile * (variance / self.count as f64).sqrt() <= self.half_width
+        let is_known = |(variance, _): (f64, f64)| self.quantile * variance.sqrt() <= self.half_width;
+        self.observed.count >= self.least && self.observed.of_mean().is_some_and(is_known)
     }
 
     fn observe(&mut self) {
         if self.with_value > 0 {
-            // Welford's sums.
-            let value = self.sum / self.with_value as f64;
-            self.count += 1;
-            let before = value - self.mean;
-            self.mean += before / self.count as f64;
-            self.squares += before * (value - self.mean);
+            self.observed.add(self.sum / self.with_value as f64);
         }
         (self.sum, self.with_value) = (0.0, 0);
     }

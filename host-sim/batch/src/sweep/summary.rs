@@ -7,6 +7,7 @@ use haptic_sim::unguided::Cause;
 use serde::Serialize;
 
 use super::effects::{Effects, small_is_bad};
+use super::groups::Moments;
 use super::saltelli::{Blocks, SobolIndex};
 use super::{Design, DesignPoint, Driven, Effect, Sweep, value};
 use crate::Away;
@@ -227,9 +228,7 @@ impl<'a> Summarised<'a> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Spread {
     classes: BTreeMap<i64, u64>,
-    count: u64,
-    mean: f64,
-    squares: f64,
+    all: Moments,
     min: Option<f64>,
     max: Option<f64>,
 }
@@ -254,10 +253,7 @@ fn middle(class: i64) -> f64 {
 impl Spread {
     pub(super) fn add(&mut self, value: f64) {
         *self.classes.entry(class(value)).or_default() += 1;
-        self.count += 1;
-        let before = value - self.mean;
-        self.mean += before / self.count as f64;
-        self.squares += before * (value - self.mean);
+        self.all.add(value);
         self.min = Some(self.min.map_or(value, |min| min.min(value)));
         self.max = Some(self.max.map_or(value, |max| max.max(value)));
     }
@@ -271,7 +267,7 @@ impl Spread {
             sums.push((within(middle(*class)), sum));
         }
         let quantile = |share: f64| {
-            let rank = (share * self.count as f64).ceil().max(1.0) as u64;
+            let rank = (share * self.all.count as f64).ceil().max(1.0) as u64;
             let at = sums.partition_point(|(_, sum)| *sum < rank);
             sums.get(at).map(|(value, _)| (share, *value))
         };
@@ -282,14 +278,14 @@ impl Spread {
             .filter(|(i, _)| i % every == 0 || i + 1 == sums.len());
         Distribution {
             metric,
-            count: self.count,
-            mean: (self.count > 0).then_some(self.mean),
-            sd: (self.count > 1).then(|| (self.squares / (self.count - 1) as f64).sqrt()),
+            count: self.all.count,
+            mean: self.all.mean(),
+            sd: self.all.variance().map(f64::sqrt),
             min: self.min,
             quantiles: QUANTILES.iter().filter_map(|share| quantile(*share)).collect(),
             max: self.max,
             cumulative: shown
-                .map(|(_, (value, sum))| (*value, *sum as f64 / self.count as f64))
+                .map(|(_, (value, sum))| (*value, *sum as f64 / self.all.count as f64))
                 .collect(),
         }
     }

@@ -3,51 +3,45 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{DesignPoint, Driven, Sweep, value};
 use crate::Away;
+use crate::entries::{Entry, EntryKind};
 
 /// Both tables on their way. Without the feature `parquet` there is only the CSV file.
 pub(super) struct Tables {
     version: String,
     csv: csv::Writer<BufWriter<File>>,
     #[cfg(feature = "parquet")]
-    parquet: super::parquet::ParquetTable,
+    parquet: crate::parquet::Table,
 }
 
 impl Tables {
     /// At the places of the CSV and of the Parquet file.
     pub(super) fn create(sweep: &Sweep, version: &str, [csv, parquet]: &[PathBuf; 2]) -> io::Result<Self> {
-        let mut table = csv::WriterBuilder::new().from_writer(BufWriter::new(create(csv)?));
-        table.write_record(header(sweep))?;
+        let columns = columns(sweep);
+        let mut table = csv::Writer::from_writer(BufWriter::new(File::create(csv)?));
+        table.write_record(columns.iter().map(|(name, _)| name))?;
         #[cfg(not(feature = "parquet"))]
         let _ = parquet;
         Ok(Self {
             version: version.into(),
             csv: table,
             #[cfg(feature = "parquet")]
-            parquet: super::parquet::ParquetTable::create(sweep, version, create(parquet)?)?,
+            parquet: crate::parquet::Table::create(
+                columns,
+                &[("haptic.version", version), ("haptic.sweep", sweep.text())],
+                File::create(parquet)?,
+            )?,
         })
     }
 
     pub(super) fn row(&mut self, point: &DesignPoint, driven: &Driven) -> io::Result<()> {
-        let numbers = [
-            point.drive.to_string(),
-            point.seed.to_string(),
-            self.version.clone(),
-        ];
-        let varied = point.values.iter().map(value::text);
-        let own = [u8::from(driven.diverged).to_string(), driven.end_m.to_string()];
-        let own = own.into_iter().chain(driven.away.texts());
-        let metrics = driven
-            .metrics
-            .iter()
-            .map(|value| value.map_or(String::new(), |value| value.to_string()));
-        self.csv
-            .write_record(numbers.into_iter().chain(varied).chain(own).chain(metrics))?;
+        let entries = entries(point, driven, &self.version);
+        self.csv.write_record(entries.iter().map(Entry::to_string))?;
         #[cfg(feature = "parquet")]
-        self.parquet.row(point, driven)?;
+        self.parquet.row(entries)?;
         Ok(())
     }
 
@@ -63,27 +57,69 @@ impl Tables {
     }
 }
 
-/// Names of the columns.
-pub(super) fn header(sweep: &Sweep) -> Vec<String> {
-    let varied = sweep
-        .columns()
-        .map(|name| if name == "seed" { "vary.seed" } else { name });
-    let names = ["drive", "seed", "version"]
-        .into_iter()
-        .chain(varied)
-        .chain(["diverged", "end_m"])
-        .chain(Away::NAMES);
-    names
-        .chain(sweep.metrics().iter().map(|d| d.name))
-        .map(String::from)
-        .collect()
+/// Names of the columns, and what they hold. What is varied is a column of numbers if all its values are numbers.
+fn columns(sweep: &Sweep) -> Vec<(String, EntryKind)> {
+    use EntryKind::{Flag, Number, Text, Whole};
+    let named = |name: &str, kind| (name.to_owned(), kind);
+    let mut columns: Vec<_> = [("drive", Whole), ("seed", Whole), ("version", Text)]
+        .map(|(name, kind)| named(name, kind))
+        .into();
+    for axis in sweep.axes() {
+        for (i, column) in axis.columns.iter().enumerate() {
+            let is_text = |row: &Vec<_>| value::number(&row[i]).is_none();
+            let kind = if axis.rows().is_some_and(|rows| rows.iter().any(is_text)) {
+                Text
+            } else {
+                Number
+            };
+            columns.push(named(
+                if column.name == "seed" {
+                    "vary.seed"
+                } else {
+                    &column.name
+                },
+                kind,
+            ));
+        }
+    }
+    columns.extend([named("diverged", Flag), named("end_m", Number)]);
+    columns.extend(
+        Away::NAMES
+            .into_iter()
+            .zip([Number, Text, Number, Number])
+            .map(|(name, kind)| named(name, kind)),
+    );
+    columns.extend(sweep.metrics().iter().map(|metric| named(metric.name, Number)));
+    columns
 }
 
-fn create(path: &Path) -> io::Result<File> {
-    File::create(path)
+/// A drive in the order of the columns.
+fn entries<'a>(point: &'a DesignPoint, driven: &Driven, version: &str) -> Vec<Entry<'a>> {
+    let mut entries = vec![
+        Entry::Whole(point.drive),
+        Entry::Whole(point.seed),
+        Entry::Text(version.into()),
+    ];
+    entries.extend(point.values.iter().map(Entry::Value));
+    let Away {
+        guidance_left_s,
+        guidance_left_why,
+        guidance_back_s,
+        unguided_s,
+    } = driven.away;
+    entries.extend([
+        Entry::Flag(driven.diverged),
+        Entry::Number(Some(driven.end_m)),
+        Entry::Number(guidance_left_s),
+        Entry::Text(guidance_left_why.map_or(String::new(), |why| why.to_string())),
+        Entry::Number(guidance_back_s),
+        Entry::Number(unguided_s),
+    ]);
+    entries.extend(driven.metrics.iter().copied().map(Entry::Number));
+    entries
 }
 
-pub(super) fn synced(mut file: BufWriter<File>) -> io::Result<()> {
+fn synced(mut file: BufWriter<File>) -> io::Result<()> {
     file.flush()?;
     file.get_ref().sync_all()
 }

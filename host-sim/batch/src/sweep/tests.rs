@@ -155,7 +155,7 @@ fn the_table_does_not_depend_on_threads_shards_and_restarts() {
         (read("drives.csv"), read("drives.parquet"), summary)
     };
     let drive = |store: &Store, shard: &str, threads| {
-        run_all(store, &sweep, shard.parse().unwrap(), threads, |_| ()).unwrap()
+        run_all(store, &sweep, shard.parse().unwrap(), Some(threads), |_| ()).unwrap()
     };
     let whole = table(&|store| drive(store, "1/1", 1));
     assert_eq!(whole.0.iter().filter(|byte| **byte == b'\n').count(), 41);
@@ -215,7 +215,7 @@ fn an_early_stop_stops_where_the_mean_is_known() {
     let table = |threads| {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(&sweep, "test 1", folder.path()).unwrap();
-        run_all(&store, &sweep, Shard::WHOLE, threads, |_| ()).unwrap();
+        run_all(&store, &sweep, Shard::WHOLE, Some(threads), |_| ()).unwrap();
         let summary = store.finish().unwrap();
         (
             std::fs::read_to_string(folder.path().join("drives.csv")).unwrap(),

@@ -118,7 +118,7 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), Stu
 }
 
 /// The number in a value, if it is one.
-pub(super) fn number(value: &Value) -> Option<f64> {
+pub(crate) fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Float(x) => Some(*x),
         Value::Integer(x) => Some(*x as f64),
@@ -127,7 +127,7 @@ pub(super) fn number(value: &Value) -> Option<f64> {
 }
 
 /// As a table's field shows it: a number that reads back to the same bits, a text without quotes.
-pub(super) fn text(value: &Value) -> String {
+pub(crate) fn text(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
         Value::Float(x) => x.to_string(),

@@ -3,7 +3,7 @@
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::{Failure, FailureKind, Scenario};
 use haptic_sim::simulation::{Run, simulate};
-use haptic_vectorised::{Event, Options};
+use haptic_vectorised::Options;
 
 use super::{Chunk, Driven, Sweep};
 use crate::record::nominal_peak_m;
@@ -41,42 +41,36 @@ impl Sweep {
                 let nominal = scenario.to_builder().failure(failure).build();
                 nominals.push(nominal.map_err(|e| InputError::new(&self.name, e))?);
                 places.push(place);
-                peaks[place] = None;
             }
         }
-        self.run_batch(first, &nominals, |number, run| {
+        let found = self.run_batch(first, &nominals, |number, run| {
             let scenario = &scenarios[places[number]];
-            let peak_m = nominal_peak_m(run, self.window_of(scenario), scenario.failure().time_s);
-            peaks[places[number]] = Some(peak_m);
+            nominal_peak_m(run, self.window_of(scenario), scenario.failure().time_s)
         })?;
-        let mut rows: Vec<Option<Driven>> = vec![None; scenarios.len()];
-        self.run_batch(first, scenarios, |number, run| {
-            rows[number] = peaks[number].map(|peak_m| self.measured(&scenarios[number], run, peak_m));
+        for (place, peak_m) in places.into_iter().zip(found) {
+            peaks[place] = peak_m;
+        }
+        let rows = self.run_batch(first, scenarios, |number, run| {
+            peaks[number].map(|peak_m| self.measured(&scenarios[number], run, peak_m))
         })?;
-        Ok(rows)
+        Ok(rows.into_iter().map(Option::flatten).collect())
     }
 
-    /// Takes what is driven side by side, and leaves what is rejected.
-    fn run_batch(
+    /// What `measure` makes of what is driven side by side; nothing of what is rejected.
+    fn run_batch<T>(
         &self,
         first: u64,
         scenarios: &[Scenario],
-        mut take: impl FnMut(usize, &Run),
-    ) -> Result<(), InputError> {
+        measure: impl Fn(usize, &Run) -> T,
+    ) -> Result<Vec<Option<T>>, InputError> {
         let group = Group {
             scenarios,
             first,
             checked: Checked::new(self.seed, self.drives()),
         };
-        let on = |place: usize, event: Event| {
-            if let Event::Ended(run) = event {
-                take(place, run);
-            }
-            Ok(())
-        };
         let alone = |place: usize| simulate(&scenarios[place]);
-        let rejected = group.run_batch(Options::default(), alone, on);
-        rejected.map(drop).map_err(|e| InputError::new(&self.name, e))
+        let found = group.measured(Options::default(), alone, |place, run| Ok(measure(place, run)));
+        found.map_err(|e| InputError::new(&self.name, e))
     }
 }
 

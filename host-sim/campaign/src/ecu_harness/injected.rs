@@ -7,7 +7,7 @@ use haptic_core::quantity::{Instant, Torque};
 use rand::RngExt;
 
 use super::EcuHarness;
-use crate::injection::{Hand, Injection, Inside, Motor};
+use crate::injection::{Hand, Injection, Inside, Motor, first_of};
 
 /// A new random law every so many ms.
 const LAW_HELD_MS: i64 = 200;
@@ -60,11 +60,7 @@ impl EcuHarness<'_> {
 
     /// Torque that the motor delivers, N.m.
     pub(super) fn motor(&self, step: u32) -> f64 {
-        let motor = self.row.injections.iter().find_map(|injection| match injection {
-            Injection::Motor(motor) if self.timing.acts(step) => Some(*motor),
-            _ => None,
-        });
-        match motor {
+        match first_of!(self.timing.acting(step), Injection::Motor(motor) => *motor) {
             None => self.commanded_nm,
             Some(Motor::Times(share)) => share * self.commanded_nm,
             Some(Motor::Stuck) => self.stuck_nm,
@@ -79,11 +75,7 @@ impl EcuHarness<'_> {
         } else {
             -self.commanded_nm.signum()
         };
-        let hand = self.row.injections.iter().find_map(|injection| match injection {
-            Injection::Hand(hand) => Some(*hand),
-            _ => None,
-        });
-        match hand {
+        match first_of!(self.row.injections, Injection::Hand(hand) => *hand) {
             Some(Hand::Jerk {
                 peak_nm,
                 ms,

@@ -1,6 +1,6 @@
 //! When the faults of a case act, and at which instants of its clock the ECU runs.
 
-use crate::injection::{Clock, Injection};
+use crate::injection::{Clock, Injection, first_of};
 use crate::table::FaultCase;
 
 /// A case that begins at a step.
@@ -33,21 +33,16 @@ impl<'a> FaultTiming<'a> {
         i64::from(step) - i64::from(self.onset)
     }
 
-    pub(super) fn acts(&self, step: u32) -> bool {
+    /// What acts in a step.
+    pub(super) fn acting(&self, step: u32) -> &'static [Injection] {
         let since = self.since(step);
-        !self.healthy && since >= 0 && self.row.lasts_ms.is_none_or(|ms| since < i64::from(ms))
-    }
-
-    pub(super) fn has(&self, injection: Injection) -> bool {
-        self.row.injections.contains(&injection)
+        let acts = !self.healthy && since >= 0 && self.row.lasts_ms.is_none_or(|ms| since < i64::from(ms));
+        if acts { self.row.injections } else { &[] }
     }
 
     /// Instants of the ECU's clock at which it runs in this step, and how many they are.
     pub(super) fn ticks(&self, step: u32) -> ([u32; 5], usize) {
-        let clock = self.row.injections.iter().find_map(|injection| match injection {
-            Injection::Clock(clock) => Some(*clock),
-            _ => None,
-        });
+        let clock = first_of!(self.row.injections, Injection::Clock(clock) => *clock);
         let rate = if let Some(Clock::Rate(rate)) = clock {
             rate
         } else {

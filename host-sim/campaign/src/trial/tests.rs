@@ -13,7 +13,7 @@ use crate::table::rows;
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=60;
 
 fn braking() -> World {
-    World::of_kind(WORLDS.iter().find(|world| world.name == "braking").unwrap())
+    World::new(Some(WORLDS.iter().find(|world| world.name == "braking").unwrap()))
 }
 
 fn by_name(name: &str) -> &'static FaultCase {
@@ -255,15 +255,19 @@ fn drivers_change_who_drives_and_nothing_else() {
 /// What runs a failure again says who drove where it is not who usually does.
 #[test]
 fn a_replay_names_world_and_drivers() {
-    let everything = || World::of_kind(WORLDS.iter().find(|world| world.name == "everything").unwrap());
-    assert_eq!(World::new().arguments(), "");
+    let everything = || {
+        World::new(Some(
+            WORLDS.iter().find(|world| world.name == "everything").unwrap(),
+        ))
+    };
+    assert_eq!(World::new(None).arguments(), "");
     assert_eq!(everything().arguments(), " --world everything");
     assert_eq!(
         everything().driven_by(Drivers::Paper).arguments(),
         " --world everything --drivers paper"
     );
     assert_eq!(
-        World::new().driven_by(Drivers::Population).arguments(),
+        World::new(None).driven_by(Drivers::Population).arguments(),
         " --drivers population"
     );
 }
@@ -272,7 +276,7 @@ fn a_replay_names_world_and_drivers() {
 /// rightly, and the run is none of a driver who loses the guidance for nothing. Who stays on the road is judged.
 #[test]
 fn a_driver_who_taps_is_judged_on_the_road_only() {
-    let world = World::new();
+    let world = World::new(None);
     let taps = by_name("driver-taps");
     let off = world.run(taps, 27);
     assert!(off.left_after_ms.is_some());

@@ -52,7 +52,7 @@ impl VehicleParameters {
 }
 
 /// A vehicle in a steady curve.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SteadyCornering {
     /// Curvature of the path per angle of the steering wheel at a crawl, 1/m.
     pub curvature_gain_per_m: f64,

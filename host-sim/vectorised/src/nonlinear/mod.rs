@@ -11,6 +11,7 @@ use haptic_core::quantity::Torque;
 use haptic_core::safety::actuator::{Actuator, Motor};
 
 use super::counts::{ONE, bits, on_the_bus};
+use super::lanes::lanes;
 use super::rejected::Reason;
 use super::{ALIVE, ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use haptic_sim::models::STEP_S;
@@ -25,47 +26,49 @@ const LARGEST_MOTOR: i32 = ((1 << 15) - 1) << 12;
 /// In [`NonlinearPlant`]'s order.
 type State<const N: usize> = [[f64; N]; STATES];
 
-/// The plants, of the runs that have one.
-#[repr(C, align(64))]
-pub(super) struct NonlinearVehicles<const N: usize> {
-    m: [f64; N],
-    i: [f64; N],
-    l_f: [f64; N],
-    l_r: [f64; N],
-    /// Stiffness of each axle, and what it nears where tyres saturate.
-    stiffness: [[f64; N]; 2],
-    most: [[f64; N]; 2],
-    k_t: [f64; N],
-    lever: [f64; N],
-    castor_share: [f64; N],
-    inertia: [f64; N],
-    damping: [f64; N],
-    friction: [f64; N],
-    give: [f64; N],
-    /// The most that the power assist gives, at standstill, and the speed at which it is half of that.
-    assist: [f64; N],
-    assist_speed: [f64; N],
-    lag: [f64; N],
-    /// Of the motor's torque over what it is told.
-    gain: [f64; N],
-    ripple: [f64; N],
-    k_nms: [f64; N],
-    t_nms: [f64; N],
-    k_d: [f64; N],
-    k_hg: [f64; N],
-    /// By the bank, m/s2, and what the wind does in this step.
-    gravity: [f64; N],
-    force: [f64; N],
-    moment: [f64; N],
-    deflection: [f64; N],
-    motor: [f64; N],
-    saturates: [bool; N],
-    has_banks: [bool; N],
-    /// Of the runs that have one: its wind, and the bank of its whole road.
-    plants: [Option<Box<NonlinearPlant>>; N],
-    /// Core's check of a motor that does not deliver what it is told at once.
-    motors: [Option<Actuator>; N],
-    is_any: bool,
+lanes! {
+    /// The plants, of the runs that have one.
+    pub(super) struct NonlinearVehicles {
+        m: f64 = 1.0,
+        i: f64 = 1.0,
+        l_f: f64 = 1.0,
+        l_r: f64 = 1.0,
+        k_t: f64 = 1.0,
+        lever: f64 = 1.0,
+        castor_share: f64 = 1.0,
+        inertia: f64 = 1.0,
+        damping: f64 = 1.0,
+        friction: f64 = 1.0,
+        give: f64 = 1.0,
+        /// The most that the power assist gives, at standstill, and the speed at which it is half of that.
+        assist: f64 = 1.0,
+        assist_speed: f64 = 1.0,
+        lag: f64 = 1.0,
+        /// Of the motor's torque over what it is told.
+        gain: f64 = 1.0,
+        ripple: f64 = 1.0,
+        k_nms: f64 = 1.0,
+        t_nms: f64 = 1.0,
+        k_d: f64 = 1.0,
+        k_hg: f64 = 1.0,
+        /// By the bank, m/s2, and what the wind does in this step.
+        gravity: f64 = 1.0,
+        force: f64 = 1.0,
+        moment: f64 = 1.0,
+        deflection: f64 = 0.0,
+        motor: f64 = 0.0,
+        saturates: bool = false,
+        has_banks: bool = false,
+    } beside {
+        /// Stiffness of each axle, and what it nears where tyres saturate.
+        stiffness: [[f64; N]; 2] = [[1.0; N]; 2],
+        most: [[f64; N]; 2] = [[1.0; N]; 2],
+        /// Of the runs that have one: its wind, and the bank of its whole road.
+        plants: [Option<Box<NonlinearPlant>>; N] = [const { None }; N],
+        /// Core's check of a motor that does not deliver what it is told at once.
+        motors: [Option<Actuator>; N] = [const { None }; N],
+        is_any: bool = false,
+    }
 }
 
 /// What acts on every plant in a step.
@@ -80,49 +83,10 @@ pub(super) struct Acting<'a, const N: usize> {
 }
 
 impl<const N: usize> NonlinearVehicles<N> {
-    pub(super) fn new() -> Self {
-        const fn one<const N: usize>() -> [f64; N] {
-            [1.0; N]
-        }
-        Self {
-            m: one(),
-            i: one(),
-            l_f: one(),
-            l_r: one(),
-            stiffness: [one(); 2],
-            most: [one(); 2],
-            k_t: one(),
-            lever: one(),
-            castor_share: one(),
-            inertia: one(),
-            damping: one(),
-            friction: one(),
-            give: one(),
-            assist: one(),
-            assist_speed: one(),
-            lag: one(),
-            gain: one(),
-            ripple: one(),
-            k_nms: one(),
-            t_nms: one(),
-            k_d: one(),
-            k_hg: one(),
-            gravity: one(),
-            force: one(),
-            moment: one(),
-            deflection: one(),
-            motor: one(),
-            saturates: [false; N],
-            has_banks: [false; N],
-            plants: [const { None }; N],
-            motors: [const { None }; N],
-            is_any: false,
-        }
-    }
-
     /// A new run begins in a lane, with such a plant or without.
     pub(super) fn begin(&mut self, lane: usize, plant: Option<Box<NonlinearPlant>>, has_banks: bool) {
-        (self.motors[lane], self.has_banks[lane]) = (None, false);
+        self.clear(lane);
+        self.motors[lane] = None;
         if let Some(plant) = &plant {
             let (track, column, world, driver) = (&plant.vehicle, &plant.column, &plant.world, &plant.driver);
             let car = &track.vehicle;
@@ -151,8 +115,6 @@ impl<const N: usize> NonlinearVehicles<N> {
                 (&mut self.k_nms, driver.k_nms),
                 (&mut self.t_nms, driver.t_nms),
                 (&mut self.gravity, gravity(0.0, plant)),
-                (&mut self.deflection, 0.0),
-                (&mut self.motor, 0.0),
             ] {
                 all[lane] = value;
             }
@@ -220,19 +182,9 @@ impl<const N: usize> NonlinearVehicles<N> {
         next: &mut [[f64; N]; plant::STATES],
         distance_m: &mut [f64; N],
     ) {
-        if self.is_any {
-            self.runge_kutta(state, acting, next, distance_m);
+        if !self.is_any {
+            return;
         }
-    }
-
-    #[inline(always)]
-    fn runge_kutta(
-        &mut self,
-        state: &[[f64; N]; plant::STATES],
-        acting: &Acting<N>,
-        next: &mut [[f64; N]; plant::STATES],
-        distance_m: &mut [f64; N],
-    ) {
         let mut moves = [false; N];
         let mut lateral = [0.0; N];
         for (l, plant) in self.plants.iter_mut().enumerate() {

@@ -1,6 +1,7 @@
 //! What reaches the ECUs in a step: frames of the vehicle, the column and the camera, and what the motors deliver.
 
 use super::{Runs, WHEEL, YAW_RATE};
+use crate::counts::si;
 
 /// Of a camera, in ms: its rhythm, and that of the frames.
 const CAMERA_MS: u32 = 25;
@@ -20,7 +21,7 @@ impl<const N: usize> Runs<N> {
             own,
             ..
         } = self;
-        let matters = *ecus.matters();
+        let matters = ecus.matters;
         let mut turns = None;
         if phase.is_multiple_of(VEHICLE_MS) {
             speeds.receive(ecus, checks, &matters);
@@ -31,8 +32,7 @@ impl<const N: usize> Runs<N> {
         if phase.is_multiple_of(COLUMN_MS) {
             let [driver_nm, wheel] = senses.column(driver_nm, &worlds.state[WHEEL]);
             ecus.column(&driver_nm);
-            let applied = ecus.torque_nm();
-            let driver = ecus.driver_nm();
+            let [driver, applied] = [&ecus.driver, &ecus.applied].map(si);
             checks.column(&driver, &applied, &wheel, &matters, &mut ecus.suspect);
         }
         if looks {
@@ -48,7 +48,7 @@ impl<const N: usize> Runs<N> {
             let keeps = phase.is_multiple_of(CAMERA_MS);
             checks.picture(&seen, times, own, keeps, &heard, &mut ecus.suspect);
         }
-        if ecus.has_coasts() {
+        if ecus.has_coasts {
             for (l, own) in own.iter().enumerate() {
                 let heard = turns.map(|yaw_rate| [checks.speed(l), yaw_rate[l]]);
                 ecus.watch(l, *own as u32, heard, looks);
@@ -60,7 +60,7 @@ impl<const N: usize> Runs<N> {
     #[inline(always)]
     pub(super) fn hear_motors(&mut self, phase: u32) {
         let Self { worlds, ecus, .. } = self;
-        let (matters, is_heard) = (*ecus.matters(), phase.is_multiple_of(COLUMN_MS));
+        let (matters, is_heard) = (ecus.matters, phase.is_multiple_of(COLUMN_MS));
         worlds
             .nonlinear
             .judge(is_heard, &ecus.applied, &matters, &mut ecus.suspect);
