@@ -15,6 +15,7 @@ use haptic_core::safety::yaw::{self, BIAS_SHIFT};
 use super::counts::{ONE, flag, ms, speed_heard};
 use super::lanes::lanes;
 use super::rejected::Reason;
+use super::{ALIVE, either};
 use haptic_sim::scenario::Scenario;
 
 /// So much narrower than core's are the margins here, N.m.s and m.
@@ -48,13 +49,13 @@ const DOUBTFUL: f64 = 0.25 * yaw::MARGIN.rad();
 const YAW_RATE_COUNTS: f64 = 4096.0;
 /// A driver torque is still for so long, ms, a little shorter than core's; so far the wheel turns meanwhile, less a step of its
 /// sensor.
-const STILL_MS: i32 = ms(frozen_torque::LASTS) as i32 - 10;
-const STILL_WITHIN_MS: i32 = ms(frozen_torque::WITHIN) as i32;
+const STILL_MS: f64 = ms(frozen_torque::LASTS) as f64 - 10.0;
+const STILL_WITHIN_MS: f64 = ms(frozen_torque::WITHIN) as f64;
 const TURNED: f64 = frozen_torque::MOST_TURN.rad() - 0.002;
 const TURNED_WHEN_ASKED: f64 = frozen_torque::MOST_TURN_WHEN_TESTED.rad() - 0.002;
 /// Times in s: between frames of the column, and of the vehicle.
 const COLUMN_S: f64 = 0.002;
-const COLUMN_MS: i32 = 2;
+const COLUMN_MS: f64 = 2.0;
 const VEHICLE_S: f64 = 0.010;
 /// Directions of the line are kept, one every 25 ms.
 const LINES: usize = 32;
@@ -83,7 +84,7 @@ lanes! {
         column_sum: f64 = 0.0,
         /// The driver torque, for how long it has been the same, ms, between which wheel angles, and what these may differ by.
         torque: f64 = 0.0,
-        still_ms: i32 = 0,
+        still_ms: f64 = 0.0,
         least: f64 = 0.0,
         most: f64 = 0.0,
         may_turn: f64 = 0.0,
@@ -183,12 +184,13 @@ impl<const N: usize> Checks<N> {
             let dt = COLUMN_S * self.began[l];
             let begins = (driver[l] != self.torque[l]) | (self.still_ms[l] >= STILL_WITHIN_MS);
             self.torque[l] = driver[l];
-            self.still_ms[l] = if begins { 0 } else { self.still_ms[l] + COLUMN_MS };
+            let begins = if begins { ALIVE } else { 0 };
+            self.still_ms[l] = either(begins, 0.0, self.still_ms[l] + COLUMN_MS);
             let sensed = (wheel[l].to_degrees() / RESOLUTION).round() * RESOLUTION.to_radians();
             let damped = (sensed - self.wheel[l]) * self.damping[l];
             self.wheel[l] = sensed;
-            self.least[l] = if begins { sensed } else { self.least[l].min(sensed) };
-            self.most[l] = if begins { sensed } else { self.most[l].max(sensed) };
+            self.least[l] = either(begins, sensed, self.least[l].min(sensed));
+            self.most[l] = either(begins, sensed, self.most[l].max(sensed));
             let turned = self.most[l] - self.least[l];
             let is_still = (self.still_ms[l] >= STILL_MS) & (turned >= self.may_turn[l]);
             suspect[l] |= flag(is_still) & matters[l] & Reason::ColumnCheck.bit();

@@ -63,6 +63,12 @@ pub(super) fn flag(holds: bool) -> i32 {
     if holds { -1 } else { 0 }
 }
 
+/// The first where the mask is -1, the second where it is 0, without a masked store ([`super::either`]).
+#[inline(always)]
+pub(super) fn chosen(mask: i32, a: i32, b: i32) -> i32 {
+    (a & mask) | (b & !mask)
+}
+
 /// The speed at the start as its sensor has it, in counts as the bus carries it.
 pub(super) fn speed_heard(scenario: &Scenario) -> i32 {
     heard(scenario.car().sensor_errors.speed_gain * scenario.speed_m_per_s())

@@ -12,7 +12,9 @@ use haptic_core::safety::{envelope, hands, plausibility, ramp};
 
 use super::band::{Band, GUIDED, HANDOVER, OFF};
 use super::coast::{Coast, GOES_ON_MS};
-use super::counts::{MS, ONE, bits, flag, ms, on_the_bus, per_second, small_bits, speed_heard, truncated};
+use super::counts::{
+    MS, ONE, bits, chosen, flag, ms, on_the_bus, per_second, small_bits, speed_heard, truncated,
+};
 use super::lanes::lanes;
 use super::probe::Probes;
 use super::rejected::Reason;
@@ -233,8 +235,9 @@ impl<const N: usize> Ecus<N> {
             let is_felt = self.probes.is_passing_zero(l)
                 & ((driver.wrapping_abs() > HELD)
                     | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT));
-            self.felt[l] = if is_felt { driver } else { self.felt[l] };
-            self.without_ms[l] = if is_felt { 0 } else { self.without_ms[l] };
+            let is_felt = flag(is_felt) & self.matters[l];
+            self.felt[l] = chosen(is_felt, driver, self.felt[l]);
+            self.without_ms[l] &= !is_felt;
         }
     }
 
@@ -271,19 +274,15 @@ impl<const N: usize> Ecus<N> {
             );
             let e_y_rate = filtered(self.tau[l], self.e_y_rate[l], moved, dt_us);
             let e_theta_rate = filtered(self.tau[l], self.e_theta_rate[l], turned, dt_us);
-            let hears = self.hears[l] != 0;
+            let hears = self.hears[l];
             // The first picture tells of no rate.
-            let has_rate = hears & (self.first[l] == 0);
-            self.e_y_rate[l] = if has_rate { e_y_rate } else { self.e_y_rate[l] };
-            self.e_theta_rate[l] = if has_rate {
-                e_theta_rate
-            } else {
-                self.e_theta_rate[l]
-            };
-            self.e_y[l] = if hears { e_y } else { self.e_y[l] };
-            self.e_theta[l] = if hears { e_theta } else { self.e_theta[l] };
-            self.first[l] = if hears { 0 } else { self.first[l] };
-            self.age[l] = if hears { 0 } else { self.age[l] };
+            let has_rate = hears & !self.first[l];
+            self.e_y_rate[l] = chosen(has_rate, e_y_rate, self.e_y_rate[l]);
+            self.e_theta_rate[l] = chosen(has_rate, e_theta_rate, self.e_theta_rate[l]);
+            self.e_y[l] = chosen(hears, e_y, self.e_y[l]);
+            self.e_theta[l] = chosen(hears, e_theta, self.e_theta[l]);
+            self.first[l] &= !hears;
+            self.age[l] &= !hears;
         }
         self.band.picture(&seen, own, &self.hears);
         seen

@@ -58,6 +58,13 @@ pub const BATCH: usize = 8;
 /// All bits of a lane that is under way.
 const ALIVE: u64 = u64::MAX;
 
+/// The first where all bits of the mask are set, the second where none is: as a choice the compiler makes a masked store
+/// of it, which some processors take long for.
+#[inline(always)]
+fn either(mask: u64, a: f64, b: f64) -> f64 {
+    f64::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
+}
+
 /// Where the widest vectors lie within one line of the cache. What a step keeps on the stack is in it: with one such
 /// local the compiler aligns its own spilled vectors too, which it otherwise does not.
 #[repr(C, align(64))]

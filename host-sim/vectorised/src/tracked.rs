@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::divide::{FORTY, SIX, TWENTY_FOUR};
 use super::lanes::lanes;
-use super::{ALIVE, Aligned};
+use super::{ALIVE, Aligned, either};
 use haptic_sim::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Shape, Tracker};
 
 /// Steps of a search, of which one or two are the rule.
@@ -220,11 +220,4 @@ impl<const N: usize> Tracked<N> {
         }
         left
     }
-}
-
-/// The first where all bits of the mask are set, the second where none is: as a choice the compiler makes a masked store
-/// of it, which some processors take long for.
-#[inline(always)]
-fn either(mask: u64, a: f64, b: f64) -> f64 {
-    f64::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
 }

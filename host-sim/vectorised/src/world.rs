@@ -183,10 +183,11 @@ impl<const N: usize> Worlds<N> {
         self.nonlinear
             .step(&self.state, &acting, next, &mut self.distance);
         (self.state, self.target) = places.0;
+        let mut squares = [0.0; N];
         for l in 0..N {
             let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);
             let square = half_turn * half_turn;
-            self.suspect[l] |= if square < 1e-6 { 0 } else { ALIVE };
+            squares[l] = square;
             let (sin, cos) = (
                 half_turn * (1.0 - SIX.divide::<FUSED>(square)),
                 1.0 - square * (0.5 - TWENTY_FOUR.divide::<FUSED>(square)),
@@ -195,6 +196,9 @@ impl<const N: usize> Worlds<N> {
             self.x[l] += self.distance[l] * x;
             self.y[l] += self.distance[l] * y;
             [self.direction[0][l], self.direction[1][l]] = rotated([x, y], sin, cos);
+        }
+        for l in 0..N {
+            self.suspect[l] |= if squares[l] < 1e-6 { 0 } else { self.alive[l] };
         }
     }
 
