@@ -255,13 +255,22 @@ impl Centreline {
             s += piece.length_m;
         }
         Self {
-            cells,
-            grounds,
-            length_m: s,
-            last_m: s + OVERRUN_M,
-            lane_width_m: course.lane_width_m(),
             start,
             has_kinks: true,
+            ..Self::of_cells(course, cells, grounds, s)
+        }
+    }
+
+    /// A smooth curve that starts at the origin of its file.
+    fn of_cells(course: &Course, cells: Vec<Cell>, grounds: Vec<Ground>, length_m: f64) -> Self {
+        Self {
+            cells,
+            grounds,
+            length_m,
+            last_m: length_m + OVERRUN_M,
+            lane_width_m: course.lane_width_m(),
+            start: Pose::default(),
+            has_kinks: false,
         }
     }
 
@@ -303,15 +312,7 @@ impl Centreline {
             }
             s += length_m;
         }
-        Self {
-            cells,
-            grounds,
-            length_m: s,
-            last_m: s + OVERRUN_M,
-            lane_width_m: course.lane_width_m(),
-            start: Pose::default(),
-            has_kinks: false,
-        }
+        Self::of_cells(course, cells, grounds, s)
     }
 
     /// Where the start of the curve is in the frame of the course's file.
