@@ -1,0 +1,105 @@
+use super::*;
+
+/// Worked out apart from this program: times to the nearest microsecond, 1/(2*pi*corner) to the nearest 2^-8 us.
+#[test]
+fn times_are_rounded_to_the_nearest_count() {
+    for (far_time_s, near_time_s, between_us, rate_corner_hz, tau) in [
+        (0.7, 0.3, 400_000, 10.0, 4_074_367),
+        (1.234_567_6, 0.1, 1_134_568, 0.5, 81_487_331),
+        (1.0, 0.25, 750_000, 7.3, 5_581_324),
+        (0.3, 0.7, 0, 60.0, 679_061),
+    ] {
+        let mut params = Params {
+            rate_corner_hz,
+            ..Params::PAPER
+        };
+        (params.vehicle.far_time_s, params.vehicle.near_time_s) = (far_time_s, near_time_s);
+        let config = Config::new(&params).unwrap();
+        assert_eq!(config.plausibility.between.time(), Micros::from_us(between_us));
+        assert_eq!(config.law.tau, tau, "{rate_corner_hz}");
+    }
+}
+
+/// The longest look-ahead, 3 s, and lambda_min share a word; only driver activity has a lambda_min, also one of zero.
+#[test]
+fn time_and_least_share_share_a_word() {
+    for (law, lambda_min, share) in [
+        (0.0, 1.0, None),
+        (1.0, 0.0, Some(0.0)),
+        (1.0, 1.0, Some(1.0)),
+        (2.0, 1.0, None),
+    ] {
+        let mut params = Params {
+            law,
+            activity_lambda_min: lambda_min,
+            ..Params::PAPER
+        };
+        (params.vehicle.far_time_s, params.vehicle.near_time_s) = (3.0, 0.0);
+        let between = Config::new(&params).unwrap().plausibility.between;
+        assert_eq!(between.time(), Micros::from_us(3_000_000));
+        assert_eq!(between.least_share(), share.map(LeastShare::from_si), "{law}");
+    }
+}
+
+/// Worked out apart from this program. No two parameters that could take each other's place are alike.
+#[test]
+fn each_parameter_reaches_monitor_and_estimator() {
+    let params = Params {
+        k_1: 0.5,
+        a_1: 1.5,
+        a_2: 0.1,
+        a_3: 20.0,
+        a_4: 0.7,
+        torque_limit_nm: 4.2,
+        wind_up_nm_per_s: 3.2,
+        reduction_nm_per_s: 6.0,
+        probe_amplitude_nm: 0.123_4,
+        probe_frequency_hz: 2.3,
+        t_nms_s: 0.08,
+        k_nms: 0.7,
+        ..Params::PAPER
+    };
+    let Setup {
+        monitor, estimator, ..
+    } = Setup::new(&params).unwrap();
+    let expected = Monitor {
+        limit_mnm: 4200,
+        // Up to whole mN.m.
+        growth_mnm_per_ms: 4,
+        fall_mnm_per_ms: 6,
+        band_mnm: 364,
+        probe_mnm: 124,
+        gains_mnm: [750, 10_000, 50, 350],
+    };
+    assert_eq!(monitor, expected);
+    assert_eq!((estimator.phase_per_us, estimator.periods), (9878, 5));
+    assert_eq!((estimator.amplitude_nm, estimator.k_nms), (0.123_4, 0.7));
+    assert!((estimator.lag - 1.156_11).abs() < 1e-5);
+    assert!((f64::from(estimator.muscle) - arm_share(&params)).abs() < 1e-6);
+}
+
+/// An arm with the lag x that is read with the lag y gives (1 + x y)/(1 + x^2) of K_hg. The error, as a share of what is read, of
+/// 91 arms over the range.
+#[test]
+fn the_share_of_the_arm_is_the_largest_error_of_any_arm() {
+    for t_nms_s in [0.01, 0.05, 0.08, 0.1, 0.13, 0.2, 0.5, 1.0] {
+        for probe_frequency_hz in [1.0, 2.5, 5.0] {
+            let turns = core::f64::consts::TAU * probe_frequency_hz;
+            let error = |step: u32| {
+                let x = turns * (0.06 + 0.001 * f64::from(step));
+                let read = (1.0 + x * turns * t_nms_s) / (1.0 + x * x);
+                (read - 1.0).abs() / read
+            };
+            let most = (0..=90).map(error).fold(0.0, f64::max);
+            let share = arm_share(&Params {
+                t_nms_s,
+                probe_frequency_hz,
+                ..Params::PAPER
+            });
+            assert!(
+                (share - most).abs() < 1e-3 * most,
+                "{t_nms_s} {probe_frequency_hz}: {share}, not {most}"
+            );
+        }
+    }
+}
