@@ -10,7 +10,7 @@
 pub use super::evaluation_results::Claim;
 use super::evaluation_results::{DRIVERS_T_P, EvaluationResults};
 use super::{Away, RunRecord, left_by_themselves};
-use haptic_analysis::metrics::Window;
+use haptic_analysis::metrics::{Metrics, Window};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 use haptic_sim::simulation::Run;
@@ -157,18 +157,17 @@ impl Claims<'_> {
         }
     }
 
+    fn metric(&self, run: (f64, Condition, FailureKind), of: fn(&Metrics) -> Option<f64>) -> f64 {
+        let record = self.results.record(run.0, run.1, run.2);
+        record.and_then(|r| of(&r.metrics)).unwrap_or(f64::NAN)
+    }
+
     fn peak(&self, t_p: f64, condition: Condition, failure: FailureKind) -> f64 {
-        let record = self.results.record(t_p, condition, failure);
-        record
-            .and_then(|r| r.metrics.peak_lateral_error_m)
-            .unwrap_or(f64::NAN)
+        self.metric((t_p, condition, failure), |m| m.peak_lateral_error_m)
     }
 
     fn mean(&self, t_p: f64, condition: Condition, failure: FailureKind) -> f64 {
-        let record = self.results.record(t_p, condition, failure);
-        record
-            .and_then(|r| r.metrics.mean_abs_lateral_error_m)
-            .unwrap_or(f64::NAN)
+        self.metric((t_p, condition, failure), |m| m.mean_abs_lateral_error_m)
     }
 
     fn nominal(&self, t_p: f64, condition: Condition) -> f64 {

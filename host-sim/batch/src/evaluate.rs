@@ -2,16 +2,13 @@
 //! guidance. A manual run has no failure run, so there are 21. Beyond the paper, 9 more in which the guidance's
 //! input fails, and the ECU hands over.
 
-use rayon::prelude::*;
-
 use super::RunRecord;
 use super::claims;
 pub use super::evaluation_results::{DRIVERS_T_P, EvaluationResults};
 use super::record::{default_window, failure_notes, nominal_peak_m};
-use super::vectorised::run_batched;
+use super::vectorised::run_all;
 use crate::error::StudyError;
 use haptic_analysis::metrics::Window;
-use haptic_sim::fork::simulate_forked;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, ScenarioError};
 use haptic_sim::simulation::Run;
@@ -41,20 +38,12 @@ pub fn evaluate(
 ) -> Result<Evaluation, StudyError> {
     let window = window.unwrap_or_else(|| default_window(base.course()));
     super::check_window(window, base)?;
-    let mut runs = drive(families(base)?, base.seed(), &progress)?;
-    // Driver by driver: without failure, with the sudden loss; behind all of them the lost inputs. Stable.
-    let place = |scenario: &Scenario| match scenario.failure().kind {
-        FailureKind::Input => usize::MAX,
-        kind => {
-            let driver = DRIVERS_T_P
-                .iter()
-                .position(|t_p| *t_p == scenario.driver().t_p)
-                .unwrap_or(0);
-            2 * driver + usize::from(kind == FailureKind::Torque)
-        }
-    };
-    runs.sort_by_key(|(scenario, _)| place(scenario));
-
+    let scenarios = scenarios(base)?;
+    let runs = run_all(&scenarios, base.seed(), |_, run| {
+        progress();
+        Ok(run.clone())
+    })?;
+    let runs: Vec<(Scenario, Run)> = scenarios.into_iter().zip(runs).collect();
     let peak_without_failure = |failed: &Scenario| {
         let failure_time_s = failed.failure().at_s()?;
         let (_, run) = runs.iter().find(|(scenario, _)| {
@@ -88,75 +77,24 @@ pub fn evaluate(
     Ok(Evaluation { runs, results })
 }
 
-/// A driver under a condition, and what fails: driven together until it does.
-struct Family {
-    nominal: Scenario,
-    failing: Vec<Scenario>,
-}
-
-fn families(base: &Scenario) -> Result<Vec<Family>, ScenarioError> {
-    let mut families = Vec::with_capacity(RUNS);
-    for t_p in DRIVERS_T_P {
-        for condition in Condition::ALL {
-            let driver = DriverParameters {
-                t_p,
-                ..*base.driver()
-            };
-            let with = |kind| {
-                let failure = Failure {
-                    kind,
-                    ..base.failure()
-                };
-                let scenario = base.to_builder().condition(condition).driver(driver);
-                scenario.failure(failure).build()
-            };
-            let failing = match condition {
-                // There is no guidance to fail.
-                Condition::Manual => Vec::new(),
-                _ => vec![with(FailureKind::Torque)?, with(FailureKind::Input)?],
-            };
-            families.push(Family {
-                nominal: with(FailureKind::None)?,
-                failing,
-            });
-        }
-    }
-    Ok(families)
-}
-
-/// All runs, family by family: side by side, and a family of which one is rejected as a fork with the shipping ECU.
-fn drive(
-    families: Vec<Family>,
-    seed: u64,
-    progress: &(impl Fn() + Sync),
-) -> Result<Vec<(Scenario, Run)>, StudyError> {
-    let all = families
-        .iter()
-        .flat_map(|family| std::iter::once(&family.nominal).chain(&family.failing));
-    let scenarios: Vec<Scenario> = all.cloned().collect();
-    let mut runs = run_batched(&scenarios, seed, |_, run| Ok(run.clone()))?.into_iter();
-    let with_runs: Vec<(Family, Vec<Option<Run>>)> = families
-        .into_iter()
-        .map(|family| {
-            let of_family = runs.by_ref().take(1 + family.failing.len()).collect();
-            (family, of_family)
-        })
-        .collect();
-    let driven: Vec<Vec<(Scenario, Run)>> = with_runs
-        .into_par_iter()
-        .map(|(family, runs)| {
-            let Family { nominal, failing } = family;
-            let runs = match runs.into_iter().collect::<Option<Vec<Run>>>() {
-                Some(runs) => runs,
-                None => {
-                    let failures: Vec<Failure> = failing.iter().map(Scenario::failure).collect();
-                    let (run, failed) = simulate_forked(&nominal, &failures)?;
-                    std::iter::once(run).chain(failed).collect()
-                }
-            };
-            let scenarios = std::iter::once(nominal).chain(failing);
-            Ok(scenarios.zip(runs).inspect(|_| progress()).collect())
-        })
-        .collect::<Result<_, ScenarioError>>()?;
-    Ok(driven.into_iter().flatten().collect())
+/// Driver by driver without failure, then with the sudden loss; behind all of them the lost inputs.
+fn scenarios(base: &Scenario) -> Result<Vec<Scenario>, ScenarioError> {
+    let with = |t_p, kind| {
+        let driver = DriverParameters {
+            t_p,
+            ..*base.driver()
+        };
+        let failure = Failure {
+            kind,
+            ..base.failure()
+        };
+        let scenario = base.to_builder().driver(driver).failure(failure);
+        let of = move |condition: &Condition| scenario.clone().condition(*condition).build();
+        // By hand there is no guidance to fail.
+        let can_be = |condition: &&Condition| kind == FailureKind::None || **condition != Condition::Manual;
+        Condition::ALL.iter().filter(can_be).map(of).collect::<Vec<_>>()
+    };
+    let first = DRIVERS_T_P.map(|t_p| [FailureKind::None, FailureKind::Torque].map(|kind| with(t_p, kind)));
+    let lost_inputs = DRIVERS_T_P.map(|t_p| with(t_p, FailureKind::Input));
+    first.into_iter().flatten().chain(lost_inputs).flatten().collect()
 }

@@ -174,26 +174,8 @@ pub(crate) fn run_all<T: Send>(
     seed: u64,
     measure: impl Fn(usize, &Run) -> Result<T, StudyError> + Sync,
 ) -> Result<Vec<T>, StudyError> {
-    let found = run_batched(scenarios, seed, &measure)?
-        .into_par_iter()
-        .zip(scenarios);
-    let found = found
-        .enumerate()
-        .map(|(number, (found, scenario))| found.map_or_else(|| measure(number, &simulate(scenario)), Ok));
-    found.collect()
-}
-
-/// As [`run_all`], but what is rejected is nothing: whoever asks may have a better way to drive it.
-///
-/// # Errors
-/// As [`run_all`].
-pub(crate) fn run_batched<T: Send>(
-    scenarios: &[Scenario],
-    seed: u64,
-    measure: impl Fn(usize, &Run) -> Result<T, StudyError> + Sync,
-) -> Result<Vec<Option<T>>, StudyError> {
     let checked = Checked::new(seed, scenarios.len() as u64);
-    in_groups(scenarios, |first, scenarios| {
+    let found = in_groups(scenarios, |first, scenarios| {
         let group = Group {
             scenarios,
             first: first as u64,
@@ -203,7 +185,11 @@ pub(crate) fn run_batched<T: Send>(
         group.measured(Options::default(), alone, |place, run| {
             measure(first + place, run)
         })
-    })
+    })?;
+    let found = found.into_par_iter().zip(scenarios).enumerate();
+    found
+        .map(|(number, (found, scenario))| found.map_or_else(|| measure(number, &simulate(scenario)), Ok))
+        .collect()
 }
 
 /// What `of_group` makes of the parts of a list, on all cores, in the list's order; it gets the place of the part's first.

@@ -72,6 +72,14 @@ impl<'k, P: ?Sized> Chosen<'k, P> {
         pairs.map(|(value, p)| value.unwrap_or(p.default)).collect()
     }
 
+    /// Its kind in what is around it.
+    fn kinds(&self) -> String {
+        let around = self.around.iter().map(|(outer, _)| outer.name);
+        around.fold(self.kind.name.to_owned(), |inner, outer| {
+            format!("{outer}({inner})")
+        })
+    }
+
     /// The same, with other values of some parameters of what is around it.
     pub(crate) fn with_habit(&self, kind: &str, changed: &[(&str, f64)]) -> Self {
         let value = |p: &Parameter, value: &f64| {

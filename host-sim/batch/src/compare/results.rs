@@ -216,16 +216,7 @@ pub(super) fn sum_up(
         laws: (compare.laws.iter().zip(&compare.oracles).zip(tuned))
             .map(law_result)
             .collect(),
-        drivers: compare
-            .drivers
-            .iter()
-            .map(|d| {
-                [
-                    d.name.clone(),
-                    kinds(d.kind.name, d.around.iter().map(|(k, _)| k.name)),
-                ]
-            })
-            .collect(),
+        drivers: (compare.drivers.iter().map(|d| [d.name.clone(), d.kinds()])).collect(),
         places: compare
             .judged
             .places
@@ -320,7 +311,7 @@ fn ratios(compare: &Compare, driven: &[Driven]) -> Vec<Ratio> {
 fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &bool), Tuned)) -> LawResult {
     LawResult {
         name: law.name.clone(),
-        kind: kinds(law.kind.name, law.around.iter().map(|(k, _)| k.name)),
+        kind: law.kinds(),
         source: law.kind.source,
         values: law
             .kind
@@ -332,10 +323,6 @@ fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &boo
         oracle: *oracle,
         objective: tuned.objective,
     }
-}
-
-fn kinds(kind: &str, around: impl Iterator<Item = &'static str>) -> String {
-    around.fold(kind.to_owned(), |inner, outer| format!("{outer}({inner})"))
 }
 
 /// Of values by place, then seed: each seed's mean over the places that have a value, then over the seeds.

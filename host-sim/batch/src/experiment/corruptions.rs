@@ -35,16 +35,15 @@ impl Held {
     }
 
     pub(super) fn new<'a>(values: impl Iterator<Item = &'a Compared>) -> Self {
-        values
-            .filter(|v| v.1.identified)
-            .fold(Self::default(), |sum, v| Self {
-                identified: sum.identified + 1,
-                held: sum.held
-                    + usize::from(
-                        v.1.interval_95
-                            .is_some_and(|[low, high]| low <= v.2 && v.2 <= high),
-                    ),
-            })
+        let known: Vec<&Compared> = values.filter(|v| v.1.identified).collect();
+        let holds = |(_, p, truth): &Compared| {
+            p.interval_95
+                .is_some_and(|[low, high]| (low..=high).contains(truth))
+        };
+        Self {
+            identified: known.len(),
+            held: known.into_iter().filter(|v| holds(v)).count(),
+        }
     }
 }
 

@@ -24,17 +24,8 @@ impl Recorder {
     /// An empty log; `rounded` says whether torque and angle have their sensors' resolution or are exact.
     pub fn new(rounded: bool) -> Self {
         let log = DriveLog {
-            start_s: 0.0,
             dt_s: 1.0 / f64::from(RATE_HZ),
-            e_y_m: Vec::new(),
-            e_theta_rad: Vec::new(),
-            wheel_angle_rad: Vec::new(),
-            guidance_torque_nm: Vec::new(),
-            driver_torque_nm: Vec::new(),
-            approximate_points: false,
-            resampling: Vec::new(),
-            speeds_m_per_s: None,
-            findings: Vec::new(),
+            ..DriveLog::default()
         };
         Self {
             rounded,

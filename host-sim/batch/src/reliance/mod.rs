@@ -143,6 +143,7 @@ pub struct Example {
 type EstimateAndTruth = ([f64; 2], f64);
 
 /// A drive's contribution.
+#[derive(Default)]
 struct Drive {
     /// Estimates of a steady drive at each of [`TIMES_S`].
     steady: [Vec<EstimateAndTruth>; TIMES_S.len()],
@@ -229,14 +230,7 @@ fn both_drives(
     place: usize,
     seed: u32,
 ) -> Result<Drive, StudyError> {
-    let mut result = Drive {
-        steady: Default::default(),
-        changed: None,
-        limited_steps: [0; 2],
-        diverged: 0,
-        left_by_itself: 0,
-        example: None,
-    };
+    let mut result = Drive::default();
     let truth = all[place].guided.gains();
     let steady = scenario(plan, &all[place], seed)?;
     let readings = run(&steady, SESSION_S, &mut result);

@@ -69,14 +69,10 @@ pub struct Compared {
 }
 
 /// Effects on their way.
-pub(super) struct Effects {
+pub(super) struct Effects<'a> {
+    sweep: &'a Sweep,
     axes: Vec<Axis>,
-    metrics: Vec<&'static str>,
-    has_limit: bool,
-    small_is_bad: bool,
-    compare: Option<usize>,
     judge: usize,
-    repeats: u64,
     /// Repeats that are observations of their own.
     apart: u64,
     /// The sample under way.
@@ -105,8 +101,8 @@ struct Sums {
     compared: Vec<Group>,
 }
 
-impl Effects {
-    pub(super) fn new(sweep: &Sweep, judge: usize) -> Self {
+impl<'a> Effects<'a> {
+    pub(super) fn new(sweep: &'a Sweep, judge: usize) -> Self {
         let mut column = 0;
         let axis = |axis: &super::axis::Axis| {
             let of_list = axis.rows().map(<[_]>::len);
@@ -124,13 +120,9 @@ impl Effects {
             }
         };
         Self {
+            sweep,
             axes: sweep.axes().map(axis).collect(),
-            metrics: sweep.metrics().iter().map(|d| d.name).collect(),
-            has_limit: sweep.limit.is_some(),
-            small_is_bad: small_is_bad(sweep.judge()),
-            compare: sweep.compare,
             judge,
-            repeats: sweep.repeats,
             apart: if sweep.samples > 1 {
                 1
             } else {
@@ -146,10 +138,10 @@ impl Effects {
             self.end_sample();
             self.sample = point.sample;
         }
-        let metrics = self.metrics.len();
-        let repeat = (point.drive % self.repeats % self.apart) as usize;
+        let metrics = self.sweep.metrics.len();
+        let repeat = (point.drive % self.sweep.repeats % self.apart) as usize;
         let judged = driven.metrics[self.judge];
-        let part = self.compare.map(|axis| point.levels[axis] as usize);
+        let part = self.sweep.compare.map(|axis| point.levels[axis] as usize);
         for (axis, level) in self.axes.iter_mut().zip(&point.levels) {
             let level = *level as usize;
             let level = if axis.rows > MOST_LEVELS {
@@ -207,16 +199,17 @@ impl Effects {
 
     pub(super) fn finish(mut self) -> Vec<Effect> {
         self.end_sample();
+        let has_limit = self.sweep.limit.is_some();
         // What the compared values are called; each axis met the same ones.
-        let labels: Vec<String> = self.compare.map_or_else(Vec::new, |compared| {
+        let labels: Vec<String> = self.sweep.compare.map_or_else(Vec::new, |compared| {
             self.axes[compared].levels.iter().map(Sums::label).collect()
         });
         let compared = |(part, label): (&Group, &String)| Compared {
             label: label.clone(),
-            drives: part.finish(self.has_limit),
+            drives: part.finish(has_limit),
         };
         let effect = |(place, axis): (usize, &Axis)| {
-            let labels = if self.compare == Some(place) {
+            let labels = if self.sweep.compare == Some(place) {
                 &[]
             } else {
                 &labels[..]
@@ -226,7 +219,7 @@ impl Effects {
             let level = |level: &Sums| Level {
                 label: level.label(),
                 x: level.x.mean(),
-                drives: level.all.finish(self.has_limit),
+                drives: level.all.finish(has_limit),
                 compared: level.compared.iter().zip(labels).map(compared).collect(),
             };
             Effect {
@@ -239,12 +232,9 @@ impl Effects {
                     .filter(|level| level.all.drives > 0)
                     .map(level)
                     .collect(),
-                best: axis.best(self.has_limit, self.small_is_bad),
-                shares: self
-                    .metrics
-                    .iter()
-                    .enumerate()
-                    .map(|(i, name)| (*name, of_variance(i)))
+                best: axis.best(has_limit, small_is_bad(self.sweep.judge)),
+                shares: (self.sweep.metrics.iter().enumerate())
+                    .map(|(i, metric)| (metric.name, of_variance(i)))
                     .collect(),
             }
         };

@@ -102,7 +102,7 @@ pub(super) struct Summarised<'a> {
     left: BTreeMap<Cause, u64>,
     beyond: u64,
     spreads: Vec<Spread>,
-    effects: Effects,
+    effects: Effects<'a>,
     blocks: Option<Blocks>,
     worst: Vec<Worst>,
 }

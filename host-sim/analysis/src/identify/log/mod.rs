@@ -55,7 +55,7 @@ const COARSEST_WHEEL_STEP_RAD: f64 = 0.02;
 const SHORTEST_S: f64 = 10.0;
 
 /// A drive as recorded: on an even grid, in SI units. What is missing is no number.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct DriveLog {
     /// Time of the first row, s.
     pub start_s: f64,
