@@ -25,8 +25,11 @@ const POWER_ON: u64 = 0;
 const NEW_PARAMETERS: u64 = 6;
 /// Values of `ParameterStatus_Outcome`.
 const NONE: u64 = 0;
+const RECEIVING: u64 = 1;
 const OUT_OF_ORDER: u64 = 3;
 const OUT_OF_RANGE: u64 = 4;
+const NOT_STANDING: u64 = 6;
+const NOT_UNLOCKED: u64 = 7;
 /// The machine does not wait for its client, whose speeds may be too old when a set comes: then it is sent again.
 const ATTEMPTS: usize = 60;
 
@@ -142,16 +145,18 @@ fn a_set_that_is_wrong_changes_nothing_and_is_told() {
         torque_limit_nm: 5.5,
         ..Params::PAPER
     };
-    for (params, without, outcome) in [
-        (too_much, None, OUT_OF_RANGE),
-        (Params::PAPER, Some(7), OUT_OF_ORDER),
+    for (params, without, before, outcome) in [
+        (too_much, None, NONE, OUT_OF_RANGE),
+        (Params::PAPER, Some(7), OUT_OF_RANGE, OUT_OF_ORDER),
     ] {
-        // A status may be older than the set, or say that its speeds were.
+        // A status may be older than the set, or say that its speeds or its unlocking were too old.
         let told = (0..ATTEMPTS).any(|_| {
             send(&mut machine, &params, 0, without);
             (0..5).any(|_| {
                 let (now, cause, mode) = status(&mut machine);
                 assert_eq!((now.sequence, cause, mode), (0, POWER_ON, STANDBY));
+                let may_be = [before, RECEIVING, NOT_STANDING, NOT_UNLOCKED, outcome];
+                assert!(may_be.contains(&now.outcome), "{now:?}");
                 now == IN_USE(0, outcome)
             })
         });

@@ -68,7 +68,7 @@ impl Table {
         })
     }
 
-    /// A row, with a entry of its kind for each column.
+    /// A row, with an entry of its kind for each column.
     pub(crate) fn row<'a>(&mut self, entries: impl IntoIterator<Item = Entry<'a>>) -> io::Result<()> {
         for (column, entry) in self.columns.iter_mut().zip(entries) {
             column.push(entry);

@@ -213,12 +213,12 @@ fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
     print(&serde_json::to_string_pretty(value)?)
 }
 
-/// What a reader of the results has to know, on stderr: stdout is the results' own.
 /// What to say of a file.
 fn in_file<E: Display>(path: &Path) -> impl Fn(E) -> BadInput {
     move |error| BadInput(format!("{}: {error}", path.display()))
 }
 
+/// What a reader of the results has to know, on stderr: stdout is the results' own.
 fn print_notes(notes: &[String]) {
     for note in notes {
         eprintln!("note: {note}");

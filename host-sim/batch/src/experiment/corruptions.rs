@@ -228,7 +228,7 @@ impl CorruptionLine {
                 None => causes.push((cause, 1)),
             }
         }
-        // As the sum of nothing is.
+        // Without a value there is no error; -0 is what a sum of no numbers gives.
         let rms = std::array::from_fn(|i| rms(found.iter().map(|f| error(&f.0[i]))).unwrap_or(-0.0));
         Self {
             corrupted_by: name,

@@ -1,6 +1,6 @@
 //! A shard's chunks on threads, with progress; and when enough is known.
 
-use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -97,28 +97,24 @@ pub fn run_all(
             next: 0,
         },
     ));
-    // Whether enough is known.
-    let drive = |number: u64| -> Result<bool, StudyError> {
+    let is_enough = AtomicBool::new(false);
+    let drive = |number: u64| -> Result<(), StudyError> {
+        if is_enough.load(Ordering::Relaxed) {
+            return Ok(());
+        }
         let chunk = sweep.run_chunk(number)?;
         store.put(number, &chunk.to_bytes(store.fingerprint()))?;
         let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
         let (now, prefix) = &mut *state;
         now.done += chunk.rows.len() as u64;
         progress(*now);
-        Ok(sweep.stop.is_some() && prefix.advance(store))
+        if sweep.stop.is_some() && prefix.advance(store) {
+            is_enough.store(true, Ordering::Relaxed);
+        }
+        Ok(())
     };
     let chunks = missing.into_iter().par_bridge();
-    let driven = on_threads(threads, || {
-        chunks.try_for_each(|number| match drive(number) {
-            Ok(false) => ControlFlow::Continue(()),
-            Ok(true) => ControlFlow::Break(Ok(())),
-            Err(error) => ControlFlow::Break(Err(error)),
-        })
-    });
-    match driven.map_err(|e| e.to_string())? {
-        ControlFlow::Break(Err(error)) => Err(error),
-        _ => Ok(()),
-    }
+    on_threads(threads, || chunks.try_for_each(drive)).map_err(|e| e.to_string())?
 }
 
 /// The chunks from the first on without a gap, whoever drove them.
