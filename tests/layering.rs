@@ -370,7 +370,6 @@ const LONGEST: usize = 350;
 #[rustfmt::skip]
 const LONGER: &[(&str, &str)] = &[
     ("host-sim/batch/src/adaptation/mod.rs", "one study: maps, slopes, loops, with the results of each"),
-    ("host-sim/batch/src/compare/results.rs", "one document: what is said of laws, drivers and drives"),
     ("host-sim/batch/src/experiment/mod.rs", "one study: its plan, and what is said of each participant"),
     ("host-sim/batch/src/compare/tests.rs", "every refusal of a file beside the others"),
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
