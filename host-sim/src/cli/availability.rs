@@ -12,7 +12,7 @@ use haptic_sim::worlds::WORLDS;
 use super::checkpoint::Checkpoint;
 use super::output;
 use super::results::ResultArguments;
-use super::{BadInput, Outcome, print, progress, width};
+use super::{BadInput, Outcome, chosen, print, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -64,16 +64,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             (Some(checkpoint), segments)
         }
     };
-    let (segments, bar) = (plan.segments(), "drives of five minutes");
-    let bar = progress::bar(segments.len() as u64, bar);
+    let segments = plan.segments();
+    let bar = progress::bar(segments.len() as u64, "drives of five minutes");
     let known = segments
         .iter()
         .filter(|number| on_record.iter().any(|segment| segment.is(number)));
     bar.inc(known.count() as u64);
     let results = study(&plan, &on_record, |segment| {
         bar.inc(1);
-        let kept = checkpoint.as_ref().map(|checkpoint| checkpoint.add(segment));
-        Ok(kept.transpose().map(drop)?)
+        if let Some(checkpoint) = &checkpoint {
+            checkpoint.add(segment)?;
+        }
+        Ok(())
     })?;
     bar.finish_and_clear();
     let results = Balance {
@@ -108,24 +110,6 @@ fn plan(arguments: &Arguments) -> Result<AvailabilityPlan, BadInput> {
         seed: arguments.seed,
         only: arguments.drives.clone(),
     })
-}
-
-/// Those of the names, all if there is none.
-pub(super) fn chosen<T>(
-    option: &str,
-    names: &[String],
-    all: &'static [T],
-    name_of: fn(&T) -> &'static str,
-) -> Result<Vec<&'static T>, BadInput> {
-    let known: Vec<&str> = all.iter().map(name_of).collect();
-    if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
-        let known = known.join(", ");
-        return Err(BadInput(format!(
-            "{option}: there is no {name}; there are {known}"
-        )));
-    }
-    let wanted = |one: &&'static T| names.is_empty() || names.iter().any(|name| name == name_of(one));
-    Ok(all.iter().filter(wanted).collect())
 }
 
 /// What the drives of a file belong to: another program drives others.

@@ -10,9 +10,8 @@ use haptic_report::document::write_bytes;
 use haptic_report::studies::faults::{report, report_of_run};
 use haptic_sim::worlds::WORLDS;
 
-use super::availability::chosen;
 use super::results::ResultArguments;
-use super::{BadInput, Outcome, print, progress};
+use super::{BadInput, Outcome, chosen, print, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {

@@ -213,6 +213,24 @@ fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
     print(&serde_json::to_string_pretty(value)?)
 }
 
+/// Those of the names, all if there is none.
+fn chosen<T>(
+    option: &str,
+    names: &[String],
+    all: &'static [T],
+    name_of: fn(&T) -> &'static str,
+) -> Result<Vec<&'static T>, BadInput> {
+    let known: Vec<&str> = all.iter().map(name_of).collect();
+    if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
+        let known = known.join(", ");
+        return Err(BadInput(format!(
+            "{option}: there is no {name}; there are {known}"
+        )));
+    }
+    let wanted = |one: &&'static T| names.is_empty() || names.iter().any(|name| name == name_of(one));
+    Ok(all.iter().filter(wanted).collect())
+}
+
 /// What to say of a file.
 fn in_file<E: Display>(path: &Path) -> impl Fn(E) -> BadInput {
     move |error| BadInput(format!("{}: {error}", path.display()))

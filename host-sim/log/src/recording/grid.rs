@@ -86,7 +86,7 @@ impl Recording {
                 let name = &channel.name;
                 return Err(format!("channel {name}: row {}: the time does not grow", k + 2).into());
             }
-            let (time_s, values) = channel.there(group);
+            let (time_s, values) = channel.present_values(group);
             let longest = (1..time_s.len()).max_by(|a, b| {
                 let gap = |k: usize| time_s[k] - time_s[k - 1];
                 gap(*a).total_cmp(&gap(*b))

@@ -84,7 +84,7 @@ pub struct Line {
 
 impl Series {
     /// The instants at which it has a value, and these values.
-    fn there(&self, group: &Group) -> (Vec<f64>, Vec<f64>) {
+    fn present_values(&self, group: &Group) -> (Vec<f64>, Vec<f64>) {
         let all = group.time_s.iter().copied().zip(self.values.iter().copied());
         all.filter(|(_, value)| !value.is_nan()).unzip()
     }
@@ -142,7 +142,7 @@ impl Recording {
     #[must_use]
     pub fn table(&self) -> Vec<Line> {
         let line = |(group, channel): (&Group, &Series)| {
-            let (there, _) = channel.there(group);
+            let (there, _) = channel.present_values(group);
             Line {
                 name: channel.name.clone(),
                 unit: channel.unit.clone(),
