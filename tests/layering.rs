@@ -17,20 +17,21 @@ const CORE: Arrows = &[
     // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
     ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
     ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
-    ("controller::config", &["controller::params", "estimator", "law", "law::activity", "law::fdca", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("controller::injection", &["quantity"]),
-    ("controller::inputs", &["law", "quantity", "safety::faults", "safety::redundant"]),
-    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "law", "law::activity", "law::fdca", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp"]),
-    ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "law", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    ("controller::inputs", &["lane", "quantity", "safety::faults", "safety::redundant"]),
+    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "lane", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp"]),
+    ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "lane", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("estimator", &["bus", "law::sine", "quantity"]),
-    ("law", &["quantity", "safety::redundant"]),
-    ("law::activity", &["law", "quantity", "safety::redundant"]),
-    ("law::fdca", &["law", "quantity"]),
+    // The input that bus, law and checks share.
+    ("lane", &["quantity", "safety::redundant"]),
+    ("law", &["lane", "quantity", "safety::redundant"]),
+    ("law::activity", &["law", "quantity"]),
     ("law::probe", &["law::sine", "quantity", "safety::redundant"]),
     ("law::schedule", &["quantity", "safety::redundant"]),
     ("quantity", &["safety::redundant"]),
     ("safety::actuator", &["quantity"]),
-    ("safety::coast", &["law", "quantity", "safety::redundant"]),
+    ("safety::coast", &["lane", "quantity", "safety::redundant"]),
     ("safety::envelope", &["quantity", "safety::redundant"]),
     ("safety::faults", &["quantity"]),
     ("safety::frozen_torque", &["quantity"]),
@@ -38,8 +39,7 @@ const CORE: Arrows = &[
     // Nothing of the rest but how its memory is kept.
     ("safety::monitor", &["safety::redundant"]),
     ("safety::motion_history", &["quantity"]),
-    // The law's input, and where the vehicle and its line were.
-    ("safety::plausibility", &["law", "law::activity", "quantity", "safety::motion_history", "safety::redundant", "safety::yaw"]),
+    ("safety::plausibility", &["lane", "quantity", "safety::motion_history", "safety::redundant", "safety::yaw"]),
     ("safety::ramp", &["quantity", "safety::redundant"]),
     ("safety::yaw", &["quantity", "safety::redundant"]),
     ("service::download", &["bus", "controller::config", "controller::params", "safety::faults", "safety::modes", "service::stored"]),
@@ -264,13 +264,29 @@ fn the_packages_have_the_arrows_of_their_table_and_no_others() {
     }
 }
 
+/// What no product image has: faults to inject, and a step with another law.
 #[test]
-fn only_the_campaign_asks_for_fault_injection() {
+fn only_campaign_and_simulators_ask_for_more_than_the_product() {
     for (place, _) in PACKAGES {
         let text = std::fs::read_to_string(root().join(place).join("Cargo.toml")).unwrap();
         let (product, _) = text.split_once("[dev-dependencies]").unwrap_or((&text, ""));
-        let asks = product.contains("features = [\"fault-injection\"]");
-        assert_eq!(asks, *place == "host-sim/campaign", "{place}");
+        let asks = |feature: &str| product.contains(&format!("features = [\"{feature}\"]"));
+        assert_eq!(asks("fault-injection"), *place == "host-sim/campaign", "{place}");
+        let simulates = ["host-sim/sim", "host-sim/batch"].contains(place);
+        assert_eq!(asks("another-law"), simulates, "{place}");
+    }
+}
+
+/// A check that knew a law would share its mistakes.
+#[test]
+fn safety_knows_no_law() {
+    for (module, used) in CORE {
+        let room = module.split("::").next();
+        let laws: Vec<_> = used.iter().filter(|used| used.starts_with("law")).collect();
+        assert!(
+            room != Some("safety") || laws.is_empty(),
+            "{module} may use {laws:?}"
+        );
     }
 }
 

@@ -103,6 +103,7 @@ pub mod bus;
 pub mod controller;
 pub mod ecu;
 pub mod estimator;
+pub mod lane;
 pub mod law;
 pub mod quantity;
 pub mod safety;

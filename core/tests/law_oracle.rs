@@ -4,7 +4,8 @@ use haptic_core::controller::config::Config;
 use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
 use haptic_core::controller::params::Params;
 use haptic_core::controller::{Controller, ControllerState};
-use haptic_core::law::{EgoMotion, LaneSample, Law, LawState};
+use haptic_core::lane::LaneSample;
+use haptic_core::law::{Coefficients, EgoMotion, LawState};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_core::safety::faults::FaultSet;
 use haptic_core::safety::modes::Mode;
@@ -49,9 +50,13 @@ impl Oracle {
     }
 }
 
+fn paper() -> Coefficients {
+    *Config::PAPER.law().unwrap().coefficients()
+}
+
 /// Both, fed with the same samples.
 struct Pair {
-    law: Law,
+    law: Coefficients,
     state: LawState,
     oracle: Oracle,
     t_us: u64,
@@ -61,7 +66,7 @@ struct Pair {
 impl Pair {
     fn new(p: Params) -> Self {
         Self {
-            law: Config::new(&p).unwrap().law,
+            law: *Config::new(&p).unwrap().law().unwrap().coefficients(),
             state: LawState::NEW,
             oracle: Oracle::new(p),
             t_us: 0,
@@ -192,7 +197,7 @@ fn held_errors_have_no_rate() {
 /// 0.8 s the filter of the rates has settled.
 #[test]
 fn a_line_chosen_anew_goes_on_at_the_rates_of_the_old_one() {
-    let law = Config::PAPER.law;
+    let law = paper();
     for (y_rate, theta_rate) in [(0.0, 0.0), (0.5, 0.02), (-0.5, -0.02), (0.5, -0.02)] {
         let mut state = LawState::NEW;
         let at = |ms: u32, e_y: f64| {
@@ -242,7 +247,7 @@ fn extremes_saturate() {
 #[test]
 fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
     // 0.1 rad/s for long enough that the filter has settled; then one sample is read later and later.
-    let law = Config::PAPER.law;
+    let law = paper();
     let mut state = LawState::NEW;
     let mut sample = LaneSample::default();
     for k in 0..100_u32 {
@@ -308,7 +313,7 @@ fn the_controller_alone_gives_the_law() {
 /// the way aside, beside what the near point is moved by.
 #[test]
 fn what_the_vehicle_did_since_an_old_sample_is_made_up_for() {
-    let law = Config::PAPER.law;
+    let law = paper();
     let p = Params::PAPER;
     let mut rng = SmallRng::seed_from_u64(7);
     let mut furthest = 0.0_f64;
@@ -360,7 +365,7 @@ fn two_samples_share_a_rate_over_100_ms() {
     let tau = 1.0 / (2.0 * std::f64::consts::PI * p.rate_corner_hz);
     let position = p.k_1 * p.a_1 * 0.5;
     let torque = |samples: &[(u32, f64)]| {
-        let (law, mut state, mut last) = (Config::PAPER.law, LawState::NEW, 0.0);
+        let (law, mut state, mut last) = (paper(), LawState::NEW, 0.0);
         for &(us, e_y) in samples {
             let at = Instant::from_us(us);
             let sample = LaneSample {

@@ -24,7 +24,6 @@ mod long_message;
 mod memory;
 mod modes;
 mod monitor;
-mod monitor_fdca;
 mod motor;
 mod onward;
 mod params;

@@ -2,8 +2,7 @@
 
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
-use haptic_core::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState, New, RULES};
-use haptic_core::safety::redundant::Redundant;
+use haptic_core::safety::monitor::{Evidence, Frames, Monitor, MonitorState, New, RULES};
 
 const STANDBY: u64 = 1;
 pub(crate) const ACTIVE: u64 = 2;
@@ -39,11 +38,6 @@ fn monitor(limit_nm: f64) -> Monitor {
     Setup::new(&params).unwrap().monitor
 }
 
-/// Equation (9) has no use for it.
-fn unused() -> Redundant<Fdca> {
-    Redundant::new(Fdca::new(&Params::PAPER))
-}
-
 /// A monitor with what it remembers.
 #[derive(Clone, Copy)]
 pub(crate) struct Bench {
@@ -75,7 +69,7 @@ impl Bench {
             guidance: &frame,
             elapsed_us: us,
         };
-        self.monitor.step(&mut self.state, &mut unused(), &evidence)
+        self.monitor.step(&mut self.state, &evidence)
     }
 
     fn torque(&mut self, torque: i64, mode: u64) -> bool {
@@ -621,7 +615,7 @@ fn times_are_those_of_the_clock_whatever_a_step_takes() {
                 guidance: &guidance(torque, ACTIVE),
                 elapsed_us: us,
             };
-            bench.monitor.step(&mut bench.state, &mut unused(), &evidence)
+            bench.monitor.step(&mut bench.state, &evidence)
         };
         assert!((0..50).all(|_| asks(true)));
         let steps = (0..3000).take_while(|_| asks(false)).count() as u32;

@@ -1,7 +1,7 @@
 //! Where the lane goes on to without a picture, and what is known of how the vehicle turned, against the kinematics in f64.
 
 use haptic_core::controller::config::Config;
-use haptic_core::law::LaneSample;
+use haptic_core::lane::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
 use haptic_core::safety::motion_history::MotionHistory;
 use haptic_core::safety::plausibility::PlausibilityState;

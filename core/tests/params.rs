@@ -59,10 +59,11 @@ fn a_law_that_there_is_not_is_refused() {
     for (law, says) in [
         (0.0, None),
         (1.0, None),
-        (2.0, None),
-        (0.5, Some("law = 0.5 is outside [0, 2] in whole numbers")),
-        (3.0, Some("law = 3 is outside [0, 2] 1")),
-        (f64::NAN, Some("law = NaN is outside [0, 2] 1")),
+        (0.5, Some("law = 0.5 is not a whole number from 0 to 1")),
+        (1.5, Some("law = 1.5 is not a whole number from 0 to 1")),
+        (2.0, Some("law = 2 is not a whole number from 0 to 1")),
+        (-1.0, Some("law = -1 is not a whole number from 0 to 1")),
+        (f64::NAN, Some("law = NaN is not a whole number from 0 to 1")),
     ] {
         let p = Params { law, ..Params::PAPER };
         let error = Setup::new(&p)

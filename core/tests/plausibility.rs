@@ -5,7 +5,7 @@
 //! The closed loop with the whole ECU is in the fault campaign.
 
 use haptic_core::controller::config::Config;
-use haptic_core::law::LaneSample;
+use haptic_core::lane::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque, TurningRate};
 use haptic_core::safety::motion_history::MotionHistory;
 use haptic_core::safety::plausibility::{

@@ -13,8 +13,7 @@ use haptic_core::quantity::{Radians, Ratio, Torque};
 use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::FaultSet;
 use haptic_core::safety::modes::Mode;
-use haptic_core::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState, New};
-use haptic_core::safety::redundant::Redundant;
+use haptic_core::safety::monitor::{Evidence, Frames, Monitor, MonitorState, New};
 
 /// Half an LSB of the torque on the bus, and the arithmetic of the core.
 const ROUNDING: f64 = 0.5 / 4096.0 + 1e-5;
@@ -181,7 +180,7 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
                 elapsed_us,
             };
             let state_before = state;
-            let permitted = monitor.step(&mut state, &mut unused(), &evidence);
+            let permitted = monitor.step(&mut state, &evidence);
             // The first step grows too fast for the monitor; it is not what this is about.
             if *ms == 0 && !permitted {
                 state = grown(&monitor, state_before, &request);
@@ -209,11 +208,6 @@ fn with_lane(lane: [u8; 8], request: [u8; 8], is_request_new: bool) -> Frames {
     }
 }
 
-/// Equation (9) has no use for it.
-fn unused() -> Redundant<Fdca> {
-    Redundant::new(Fdca::new(&haptic_core::controller::params::Params::PAPER))
-}
-
 /// Brings a monitor up to 0.45 N.m at its own pace on a lane error of 1 m, which asks for 0.5 N.m, with the probe asked
 /// for if `request` does.
 fn grown(monitor: &Monitor, mut state: MonitorState, request: &[u8; 8]) -> MonitorState {
@@ -239,7 +233,7 @@ fn grown(monitor: &Monitor, mut state: MonitorState, request: &[u8; 8]) -> Monit
             guidance: &guidance,
             elapsed_us: 1_000,
         };
-        assert!(monitor.step(&mut state, &mut unused(), &evidence));
+        assert!(monitor.step(&mut state, &evidence));
     }
     state
 }

@@ -3,7 +3,8 @@
 use crate::rig::Rig;
 use haptic_core::bus::Reject;
 use haptic_core::bus::messages::Message;
-use haptic_core::law::{EgoMotion, LaneSample, LawState};
+use haptic_core::lane::LaneSample;
+use haptic_core::law::{EgoMotion, LawState};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
 use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
@@ -173,7 +174,8 @@ fn a_hand_or_a_guidance_that_does_nothing_is_never_warned() {
 /// when they come, against equation (9) of the errors and rates of now.
 #[test]
 fn a_late_sample_is_made_up_for() {
-    let law = haptic_core::controller::config::Config::PAPER.law;
+    let law = haptic_core::controller::config::Config::PAPER.law().unwrap();
+    let law = law.coefficients();
     for (hz, kmh, age_ms) in [
         (0.5, 60.0, 50),
         (0.5, 60.0, 100),

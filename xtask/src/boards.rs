@@ -217,7 +217,6 @@ fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
     let mut figures = in_lock_step(board, built, "examples/live-estimate.toml", "")?;
     let activity = "examples/driver-activity.toml";
     figures.extend(in_lock_step(board, built, activity, ", driver activity")?);
-    figures.extend(in_lock_step(board, built, "examples/fdca.toml", ", FDCA")?);
     Ok(figures)
 }
 

@@ -21,7 +21,7 @@ extern "C" {
 #define HG_ECU_ALIGN 8
 
 /* Number of parameters; hg_parameter numbers them. */
-#define HG_PARAMETERS 27
+#define HG_PARAMETERS 24
 
 /* Torque of one count of hg_step.torque_raw: 2^-12 N.m, as on the bus. */
 #define HG_TORQUE_LSB_NM (1.0 / 4096.0)
@@ -85,10 +85,7 @@ typedef enum hg_parameter {
     HG_VEHICLE_FAR_TIME_S = 20,
     HG_VEHICLE_NEAR_TIME_S = 21,
     HG_LAW = 22,
-    HG_ACTIVITY_LAMBDA_MIN = 23,
-    HG_FDCA_K_Y_RAD_PER_M = 24,
-    HG_FDCA_K_PSI = 25,
-    HG_FDCA_LOHS = 26
+    HG_ACTIVITY_LAMBDA_MIN = 23
 } hg_parameter;
 
 /* A classic CAN data frame. */

@@ -13,19 +13,17 @@
 
 mod monitor;
 
-use crate::controller::params::{DRIVER_ACTIVITY, FDCA, LAWS, ParamError, Params, WHOLE, in_range};
+use crate::controller::params::{DRIVER_ACTIVITY, LAWS, ParamError, Params, WHOLE, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
-use crate::law::Law;
-use crate::law::activity::{LeastShare, TimeAndShare};
-use crate::law::fdca::Choices;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
+use crate::law::{Coefficients, Law, LawWords};
 use crate::quantity::{
-    AnglePerLength, CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
-    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+    CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
+    TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::safety::envelope::Envelope;
-use crate::safety::monitor::{Fdca, Monitor};
+use crate::safety::monitor::Monitor;
 use crate::safety::plausibility::Plausibility;
 use crate::safety::redundant::words;
 use monitor::monitor_band_nm;
@@ -33,8 +31,8 @@ use monitor::monitor_band_nm;
 words! {
     /// The checked configuration of every block of the controller.
     pub struct Config {
-        /// Equation (9).
-        pub law: Law,
+        /// The guidance law: [`Config::law`].
+        law: LawWords,
         /// Torque limits.
         pub envelope: Envelope,
         /// Margins of the input checks.
@@ -76,11 +74,15 @@ impl Config {
         }
     }
 
+    /// The law; `None` where the memory is damaged.
+    #[must_use]
+    pub const fn law(&self) -> Option<Law> {
+        self.law.law()
+    }
+
     const fn check(p: &Params) -> Result<(), ParamError> {
-        if let Err(error) = p.check() {
-            return Err(error);
-        }
-        if p.law != p.law as u32 as f64 {
+        // Before its range, so that a law that there is not is refused in one way, be it 3 or 0.5.
+        if !(p.law == 0.0 || p.law == DRIVER_ACTIVITY) {
             return Err(ParamError {
                 name: "law",
                 value: p.law,
@@ -88,6 +90,9 @@ impl Config {
                 max: (LAWS.len() - 1) as f64,
                 unit: WHOLE,
             });
+        }
+        if let Err(error) = p.check() {
+            return Err(error);
         }
         let slope = 2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz;
         let gains = [0.0, MAX_GAIN];
@@ -111,30 +116,9 @@ impl Config {
     /// The configuration of parameters that are in range.
     const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
-        let tau = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
         let between_us = (f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32;
-        let least_share = if p.law == DRIVER_ACTIVITY {
-            Some(LeastShare::from_si(p.activity_lambda_min))
-        } else {
-            None
-        };
         Self {
-            law: if p.law == FDCA {
-                let choices = Choices {
-                    k_y: AnglePerLength::from_rad_per_m(p.fdca_k_y_rad_per_m),
-                    k_psi: Ratio::from_si(p.fdca_k_psi),
-                    lohs: Ratio::from_si(p.fdca_lohs),
-                };
-                Law::of_choices(choices, tau)
-            } else {
-                Law {
-                    e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
-                    e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
-                    e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
-                    e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
-                    tau,
-                }
-            },
+            law: LawWords::new(law(p)),
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
                 wind_up: TorqueRate::from_nm_per_s(p.wind_up_nm_per_s),
@@ -147,7 +131,7 @@ impl Config {
                 column_damping: TorquePerTurningRate::from_nm_s_per_rad(v.column_damping_nm_s),
                 far_time: Seconds::from_s(v.far_time_s),
                 near_time: Seconds::from_s(v.near_time_s),
-                between: TimeAndShare::new(Micros::from_us(between_us), least_share),
+                between: Micros::from_us(between_us),
             },
             least_speed: Speed::from_m_per_s(p.least_speed_m_per_s),
             probe: Probe {
@@ -156,6 +140,25 @@ impl Config {
             },
             schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
         }
+    }
+}
+
+/// The law of parameters that are in range.
+const fn law(p: &Params) -> Law {
+    let coefficients = Coefficients {
+        e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
+        e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
+        e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
+        e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
+        tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
+    };
+    if p.law == DRIVER_ACTIVITY {
+        Law::DriverActivity {
+            coefficients,
+            least_share: Ratio::from_si(p.activity_lambda_min),
+        }
+    } else {
+        Law::Paper(coefficients)
     }
 }
 
@@ -171,8 +174,6 @@ pub struct Setup {
     pub config: Config,
     /// The monitor's own limits.
     pub monitor: Monitor,
-    /// The monitor's own FDCA.
-    pub fdca: Fdca,
     /// The estimator of K_hg.
     pub estimator: Estimator,
 }
@@ -182,7 +183,6 @@ impl Setup {
     pub const PAPER: Self = Self {
         config: Config::PAPER,
         monitor: Monitor::new(&Params::PAPER),
-        fdca: Fdca::new(&Params::PAPER),
         estimator: Estimator::new(&Params::PAPER),
     };
 
@@ -195,7 +195,6 @@ impl Setup {
             Ok(()) => Ok(Self {
                 config: Config::from_params(p),
                 monitor: Monitor::new(p),
-                fdca: Fdca::new(p),
                 estimator: Estimator::new(p),
             }),
             Err(error) => Err(error),

@@ -3,8 +3,8 @@
 //! The steps of the ECU and of the controller are written once, over an [`Injection`]. The product's `Ecu` runs them
 //! with [`NoInjection`], whose answers are constants: no field, no check and no branch of it is left in the machine
 //! code, whatever features Cargo switches on for the build. `cargo xtask gate` compares the two images. Only
-//! [`crate::ecu::injection::InjectedEcu`], with the feature `fault-injection`, and a simulator's
-//! [`crate::ecu::Ecu::step_with_law`] run them with anything else.
+//! `crate::ecu::injection::InjectedEcu`, with the feature `fault-injection`, and a simulator's
+//! `crate::ecu::Ecu::step_with_law`, with the feature `another-law`, run them with anything else.
 
 use crate::quantity::Torque;
 

@@ -2,7 +2,7 @@
 //!
 //! Not here: how a value comes from the bytes of a frame ([`crate::bus`]), and for how long it may be used ([`crate::ecu`]).
 
-use crate::law::LaneSample;
+use crate::lane::LaneSample;
 use crate::quantity::{Radians, Ratio, Speed, Torque, TurningRate};
 use crate::safety::faults::FaultSet;
 use crate::safety::redundant::words;

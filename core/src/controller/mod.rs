@@ -315,9 +315,15 @@ impl Controller {
         if !is_known_intact && !are_intact(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
+        let config = self.config.value();
+        // Both copies agree on a law that there is not: a memory fault as any other.
+        let Some(law) = config.law() else {
+            return state.lose_memory(now);
+        };
         let memory = state.memory.value_mut();
         let mut step = Step {
-            config: self.config.value(),
+            config,
+            law,
             now,
             applied,
             inputs,

@@ -37,13 +37,11 @@ pub struct Parameter {
 }
 
 /// The guidance laws that ship, in the order of the parameter `law`.
-pub const LAWS: [&str; 3] = ["paper", "driver_activity", "fdca"];
+pub const LAWS: [&str; 2] = ["paper", "driver_activity"];
 /// [`Params::law`] of driver activity.
 pub const DRIVER_ACTIVITY: f64 = 1.0;
-/// [`Params::law`] of four design choices.
-pub const FDCA: f64 = 2.0;
 
-/// [`ParamError::unit`] where a parameter is in its range and no whole number, as it has to be.
+/// [`ParamError::unit`] of a parameter that has to be a whole number.
 pub const WHOLE: &str = "in whole numbers";
 
 /// Declares the parameters: `field: unit, least to largest, default;`, a group of those that belong together, and more. New
@@ -182,16 +180,10 @@ parameters! {
             /// t'_n of it.
             near_time_s: "s", 0.0 to 5.0, 0.3;
         }
-        /// The guidance law: 0 is equation (9), 1 is driver activity, 2 is FDCA.
-        law: "1", 0.0 to 2.0, 0.0;
+        /// The guidance law: 0 is equation (9), 1 is driver activity.
+        law: "1", 0.0 to 1.0, 0.0;
         /// Least share of equation (9) that driver activity leaves to a driver who works against it.
-        activity_lambda_min: "1", 0.0 to 1.0, 0.3;
-        /// SoHF*k_y of FDCA, on e_y'.
-        fdca_k_y_rad_per_m: "rad/m", 0.0 to 10.0, 0.15;
-        /// SoHF*k_psi of FDCA, on e_theta'.
-        fdca_k_psi: "1", 0.0 to 50.0, 2.5;
-        /// LoHS of FDCA, level of haptic support: the share of the path's torque that it carries.
-        fdca_lohs: "1", 0.0 to 2.0, 1.0;
+        activity_lambda_min: "1", 0.05 to 1.0, 0.3;
     }
 }
 
@@ -219,11 +211,18 @@ pub struct ParamError {
 
 impl fmt::Display for ParamError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} = {} is outside [{}, {}] {}",
-            self.name, self.value, self.min, self.max, self.unit
-        )
+        let Self {
+            name,
+            value,
+            min,
+            max,
+            unit,
+        } = self;
+        match *unit {
+            WHOLE => write!(f, "{name} = {value} is not a whole number from {min} to {max}"),
+            "1" => write!(f, "{name} = {value} is outside [{min}, {max}]"),
+            unit => write!(f, "{name} = {value} is outside [{min}, {max}] {unit}"),
+        }
     }
 }
 

@@ -5,10 +5,10 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
+use crate::lane::LaneSample;
 use crate::law::activity::Activity;
-use crate::law::fdca::{Car, Choices};
 use crate::law::probe::ProbeState;
-use crate::law::{EgoMotion, LaneSample, LawState};
+use crate::law::{EgoMotion, Law, LawState};
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
@@ -35,10 +35,6 @@ const EARLY: Micros = Micros::from_us(500);
 /// runs away, which is a fault.
 const EARLY_STEPS: u8 = 3;
 
-/// Driver activity looks again where it has not for so long, and for so long in any step.
-const LONG_WAIT: Micros = Micros::from_ms(12);
-const LONGEST_WAIT: Micros = Micros::from_ms(50);
-
 /// A lane sample no older than this when it arrives is continued at its own rates; an older one is also corrected by how the
 /// vehicle has turned since.
 const PROMPT: Micros = Micros::from_ms(10);
@@ -57,6 +53,7 @@ const BRIDGED: FaultSet = FaultSet::NONE
 /// One step: what it reads and does not change.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
+    pub(super) law: Law,
     pub(super) now: Instant,
     pub(super) applied: Torque,
     pub(super) inputs: &'a Inputs,
@@ -106,8 +103,12 @@ impl<I: Injection> Step<'_, I> {
             changed.add(ChangedParts::COAST);
             changed.add(ChangedParts::RAMP);
             self.enter(v, mode, faults, torque_history);
+            if mode == Mode::Active {
+                // What another drive felt says nothing about this one.
+                pending.activity = Activity::NEW;
+            }
         }
-        let (torque, probe, limit) = self.torque(v, changed, mode, faults);
+        let (torque, probe, limit) = self.torque(v, changed, &mut pending.activity, mode, faults);
         v.fast.probe_applied = probe.unwrap_or(Torque::ZERO);
         // In Active with LaneStep the guidance fades away from its old line: the driver must know.
         let warning = (mode == Mode::Active && faults.contains(Fault::LaneStep))
@@ -142,11 +143,7 @@ impl<I: Injection> Step<'_, I> {
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
         let is_late = self.came_late(v, last);
-        let demanded = if self.config.law.is_fdca() {
-            self.demanded_by_fdca(v, last, is_late)
-        } else {
-            self.demanded_by_paper(v, last, is_late)
-        };
+        let demanded = self.demanded_by_paper(v, last, is_late);
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
@@ -206,10 +203,6 @@ impl<I: Injection> Step<'_, I> {
 
         if let Input::New(motion) = motion {
             self.update_motion(v, changed, motion, motion_history, &mut kept);
-            if let Some(least) = self.config.plausibility.between.least_share() {
-                let left = pending.activity.share(least);
-                v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
-            }
         }
         if fast_enough != Some(true) {
             changed.add(ChangedParts::LANE);
@@ -333,34 +326,7 @@ impl<I: Injection> Step<'_, I> {
                     kept.insert(Fault::YawRate);
                 }
             }
-            if self.config.plausibility.between.least_share().is_some() {
-                pending.lane |= self.look_at_activity(v, &mut pending.activity);
-            }
         }
-    }
-
-    /// Driver activity looks at the column in the steps that check a lane sample, unless a vehicle frame came too: those have the
-    /// most to do. Where a camera always keeps step with the vehicle frames, the next step repeats the check, and looks. Not inlined,
-    /// so that it costs (9) nothing.
-    #[cold]
-    #[inline(never)]
-    fn look_at_activity(&self, v: &Memory, activity: &mut Activity) -> bool {
-        if let Some(column) = self.inputs.column.value()
-            && let Some(least) = self.config.plausibility.between.least_share()
-        {
-            let waited = v.input_times.column.since(activity.looked_at());
-            if matches!(self.inputs.motion, Input::New(_)) && waited < LONGEST_WAIT {
-                return waited > LONG_WAIT;
-            }
-            activity.update(
-                &self.config.law,
-                least,
-                v.input_times.column,
-                column.wheel_angle,
-                [column.driver_torque, self.applied],
-            );
-        }
-        false
     }
 
     /// A time-out fault for each input without a usable value.
@@ -531,11 +497,12 @@ impl<I: Injection> Step<'_, I> {
         &self,
         v: &mut Memory,
         changed: &mut ChangedParts,
+        activity: &mut Activity,
         mode: Mode,
         faults: FaultSet,
     ) -> (Torque, Option<Torque>, LimitReason) {
         let demanded = if matches!(mode, Mode::Active | Mode::Handover) {
-            self.guidance(v, changed)
+            self.guidance(v, changed, activity)
         } else {
             Torque::ZERO
         };
@@ -606,54 +573,45 @@ impl<I: Injection> Step<'_, I> {
     #[inline(always)]
     fn demanded_by_paper(&self, v: &Memory, sample: LaneSample, is_late: bool) -> Torque {
         let ego = is_late.then(|| self.ego_motion(v, sample));
-        self.config.law.demanded(&v.law, self.now, ego.as_ref())
+        self.law.coefficients().demanded(&v.law, self.now, ego.as_ref())
     }
 
-    /// What FDCA demands for that sample. Not inlined, so that it costs (9) nothing.
-    #[cold]
-    #[inline(never)]
-    fn demanded_by_fdca(&self, v: &Memory, sample: LaneSample, is_late: bool) -> Torque {
-        let ego = is_late.then(|| self.ego_motion(v, sample));
-        let car = Car {
-            speed: v.plausibility.speed(),
-            turning_gain: v.plausibility.turning_gain(),
-            turning: v.plausibility.turning(),
-            aligning: self.config.plausibility.aligning_gain,
-        };
-        Choices::of(&self.config.law).demanded(&v.law, self.now, ego.as_ref(), &car)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn fdca(&self, v: &Memory) -> Torque {
-        self.lane.value().map_or(Torque::ZERO, |sample| {
-            self.demanded_by_fdca(v, sample, self.is_late)
-        })
+    /// The share of (9) that the law leaves where (9) asks for so much.
+    fn left_by_law(&self, activity: &mut Activity, asked: Torque) -> Ratio {
+        match &self.law {
+            Law::Paper(_) => Ratio::ONE,
+            Law::DriverActivity {
+                coefficients,
+                least_share,
+            } => {
+                if let Input::New(column) = self.inputs.column {
+                    let torques = [column.driver_torque, asked];
+                    activity.update(coefficients, self.now, column.wheel_angle, torques);
+                }
+                activity.share(*least_share)
+            }
+        }
     }
 
     /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
     /// ends guidance then. Without a lane the torque is zero.
-    fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
+    fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts, activity: &mut Activity) -> Torque {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !v.law.is_latest(&sample) {
                 changed.add(ChangedParts::LAW);
-                self.config.law.update(&mut v.law, sample);
+                self.law.coefficients().update(&mut v.law, sample);
             }
             self.demanded_by_paper(v, sample, self.is_late)
         });
-        // In the place of (9), whose words make no sense then: asked before, it would cost (9) more.
-        let demanded = if self.config.law.is_fdca() {
-            self.fdca(v)
-        } else {
-            demanded
-        };
+        let left = self.left_by_law(activity, demanded);
         let demanded = self.injection.law(v.coast.limited(demanded));
         // Clamped to 0 to 1: beyond that the host is wrong.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
-        // Neither factor exceeds 1, so the product cannot overflow.
+        // No factor exceeds 1, so the product cannot overflow.
         let share = share_of(authority.fixed(), v.share.fixed());
         let share = share_of(share, v.coast.trust.fixed());
+        let share = share_of(share, left.fixed());
         Torque::from_fixed(share_of(share, demanded.fixed()))
     }
 }

@@ -1,7 +1,7 @@
 //! A step with another law in the place of (9), for simulators that compare laws. Everything after the law is the product's: the
 //! probe, the envelope, the mode machine, the monitor ([`crate::safety::monitor::Monitor::with_another_law`]).
 //!
-//! Not here: faults that are injected (`injection`), and any law.
+//! Only with the feature `another-law`, which no product image has. Not here: faults that are injected (`injection`), and any law.
 
 use super::{Ecu, Step};
 use crate::controller::injection::Injection;

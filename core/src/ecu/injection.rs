@@ -100,8 +100,6 @@ pub enum Region {
     Ecu,
     /// The monitor's limits.
     Monitor,
-    /// What the monitor knows of FDCA.
-    Fdca,
 }
 
 impl Region {
@@ -135,7 +133,6 @@ impl Ecu {
                 flip(&mut self.memory, bit, &mut words);
             }
             Region::Monitor => flip(&mut self.monitor, bit, &mut words),
-            Region::Fdca => flip(&mut self.fdca, bit, &mut words),
         }
         words.saturating_mul(32)
     }

@@ -1,6 +1,7 @@
 //! The ECU: frames in, frames out. Holds one controller, the receivers of its inputs, the monitor, and the
 //! counters of its own frames. Firmware and simulator carry bytes to it and from it, nothing more.
 
+#[cfg(feature = "another-law")]
 mod another_law;
 #[cfg(feature = "fault-injection")]
 pub mod injection;
@@ -24,7 +25,7 @@ use crate::safety::actuator::Motor;
 use crate::safety::envelope::LimitReason;
 use crate::safety::faults::{Fault, FaultHistory, FaultSet};
 use crate::safety::modes::Mode;
-use crate::safety::monitor::{Evidence, Fdca, Frames, Monitor, MonitorState, New};
+use crate::safety::monitor::{Evidence, Frames, Monitor, MonitorState, New};
 use crate::safety::redundant::{Redundant, words};
 use receivers::Receivers;
 
@@ -96,8 +97,6 @@ pub struct Ecu {
     controller: Controller,
     state: ControllerState,
     monitor: Redundant<Monitor>,
-    /// Compared where it is read, as (9) has no use for it.
-    fdca: Redundant<Fdca>,
     memory: Redundant<Memory>,
     receivers: Receivers,
     history: FaultHistory,
@@ -161,7 +160,6 @@ impl Ecu {
             controller: Controller::new(setup.config),
             state: ControllerState::with(mode, now),
             monitor: Redundant::new(setup.monitor),
-            fdca: Redundant::new(setup.fdca),
             memory: Redundant::new(Memory::new(faults, now)),
             receivers: Receivers::new(e2e, now),
             history: FaultHistory::new(now),
@@ -216,7 +214,7 @@ impl Ecu {
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);
         faults.set(motor == Motor::Weak, Fault::MotorWeak);
         if has_test_come(&mut self.is_test_due, steps, &inputs) {
-            let passes = passes_self_test(monitor, &mut self.fdca, steps / SELF_TEST, injection);
+            let passes = passes_self_test(monitor, steps / SELF_TEST, injection);
             faults.insert_if(!passes, Fault::SelfTest);
         }
         faults.insert_if(monitor.is_none(), Fault::Memory);
@@ -233,7 +231,7 @@ impl Ecu {
             elapsed_us,
         };
         let v = self.memory.value_mut();
-        let permitted = permits(monitor, &mut v.monitor, &mut self.fdca, &evidence, injection);
+        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
         faults.insert_if(!permitted, Fault::Monitor);
         v.step = LastStep {
             applied: if permitted { command.torque } else { Torque::ZERO },
@@ -398,12 +396,7 @@ fn sample(column: &Input<ColumnState>, now: Instant, applied: Torque) -> Option<
 /// The self-test: in each turn the monitor must refuse a frame that only one of its rules refuses. A monitor whose copies differ
 /// refuses everything, and so passes.
 #[inline(never)]
-fn passes_self_test<I: Injection>(
-    monitor: Option<&Monitor>,
-    fdca: &mut Redundant<Fdca>,
-    turn: u32,
-    injection: &I,
-) -> bool {
+fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injection: &I) -> bool {
     monitor.is_none_or(|monitor| {
         let (mut state, guidance) = monitor.self_test_vector(turn);
         let evidence = Evidence {
@@ -411,7 +404,7 @@ fn passes_self_test<I: Injection>(
             guidance: &guidance,
             elapsed_us: 1000,
         };
-        !permits(Some(monitor), &mut state, fdca, &evidence, injection)
+        !permits(Some(monitor), &mut state, &evidence, injection)
     })
 }
 
@@ -419,10 +412,9 @@ fn passes_self_test<I: Injection>(
 fn permits<I: Injection>(
     monitor: Option<&Monitor>,
     state: &mut MonitorState,
-    fdca: &mut Redundant<Fdca>,
     evidence: &Evidence<'_>,
     injection: &I,
 ) -> bool {
     injection.monitor_passes(evidence.guidance)
-        || monitor.is_some_and(|monitor| monitor.step(state, fdca, evidence))
+        || monitor.is_some_and(|monitor| monitor.step(state, evidence))
 }

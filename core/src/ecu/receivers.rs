@@ -7,7 +7,7 @@ use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{Column, LanePreview, Message, Request, Sender, TIMEOUT, Vehicle, sender_of};
 use crate::bus::{Frame, Reject};
 use crate::controller::inputs::{ColumnState, Input, Inputs, Motion};
-use crate::law::LaneSample;
+use crate::lane::LaneSample;
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
 use crate::safety::actuator::Actuator;
 use crate::safety::faults::Fault;
@@ -370,7 +370,6 @@ impl Receivers {
                 let heard = self.motion.change(|slot| {
                     let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
-                    frames.vehicle = *frame.bytes();
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
                     Ok(())

@@ -13,12 +13,11 @@
 //! Error: at most 0.2 mN.m from a float64 evaluation of the same discrete law over the whole input range
 //! (`core/tests/law_oracle.rs` asserts it). Cost: see `cargo xtask bench`.
 //!
-//! The parameters may choose to leave only a share of it, by the driver's [`activity`], or [`fdca`] in its place.
+//! The parameters may choose a [`Law`] that leaves only a share of it, by the driver's [`activity`].
 //!
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
 pub mod activity;
-pub mod fdca;
 pub mod probe;
 pub mod schedule;
 pub(crate) mod sine;
@@ -26,40 +25,101 @@ pub(crate) mod sine;
 use fixed::types::extra::U20;
 use fixed::types::{I8F24, I12F20, I40F24};
 
+use crate::lane::LaneSample;
 use crate::quantity::{
-    Instant, Metres, Micros, Radians, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
+    Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
     TorquePerTurningRate, TurningRate, per_second, per_second_times, product, quotient, rounded, saturate,
 };
 use crate::safety::redundant::words;
 
-words! {
-    /// Lane errors at the guidance's own points (t'_n = 0.3 s, t'_f = 0.7 s), ISO 8855: positive asks for a
-    /// positive (left) torque.
-    #[derive(Default)]
-    pub struct LaneSample {
-        /// Lateral error e_y' at the near point.
-        pub e_y: Metres,
-        /// Yaw error e_theta' at the far point.
-        pub e_theta: Radians,
-        /// The instant that it describes.
-        pub at: Instant,
+/// The guidance law that the parameters choose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// Equation (9), the paper's law.
+    Paper(Coefficients),
+    /// A share of equation (9): less to a driver who works against it ([`activity`]).
+    DriverActivity {
+        /// Equation (9).
+        coefficients: Coefficients,
+        /// lambda_min, the share that is left in any case.
+        least_share: Ratio,
+    },
+}
+
+impl Law {
+    /// Equation (9), of which each law gives all or a share.
+    #[must_use]
+    pub const fn coefficients(&self) -> &Coefficients {
+        match self {
+            Self::Paper(coefficients) | Self::DriverActivity { coefficients, .. } => coefficients,
+        }
     }
 }
 
 words! {
-/// Coefficients of the law; immutable once validated by [`crate::controller::params`].
-pub struct Law {
-    /// K_1*a1'.
-    pub(crate) e_y: TorquePerLength,
-    /// K_1*a2'; below zero where the words of this law are those of FDCA ([`fdca::Choices`]).
-    pub(crate) e_y_rate: TorquePerSpeed,
-    /// K_1*a3'.
-    pub(crate) e_theta: TorquePerAngle,
-    /// K_1*a4'.
-    pub(crate) e_theta_rate: TorquePerTurningRate,
-    /// tau of the rate filter in 2^-8 us: a whole microsecond would cost 0.2 mN.m at the default corner.
-    pub(crate) tau: u32,
+    /// A [`Law`] as memory keeps it twice: an enum has bit patterns that no variant has, words have none.
+    pub struct LawWords {
+        /// [`PAPER`] or [`DRIVER_ACTIVITY`].
+        variant: u32,
+        coefficients: Coefficients,
+        /// Zero for a law without it.
+        least_share: Ratio,
+    }
 }
+
+const PAPER: u32 = 0;
+const DRIVER_ACTIVITY: u32 = 1;
+
+impl LawWords {
+    /// The words of a law.
+    #[must_use]
+    pub const fn new(law: Law) -> Self {
+        match law {
+            Law::Paper(coefficients) => Self {
+                variant: PAPER,
+                coefficients,
+                least_share: Ratio::ZERO,
+            },
+            Law::DriverActivity {
+                coefficients,
+                least_share,
+            } => Self {
+                variant: DRIVER_ACTIVITY,
+                coefficients,
+                least_share,
+            },
+        }
+    }
+
+    /// The law; `None` where the memory is damaged, as no law has this variant.
+    #[must_use]
+    pub const fn law(&self) -> Option<Law> {
+        let coefficients = self.coefficients;
+        match self.variant {
+            PAPER => Some(Law::Paper(coefficients)),
+            DRIVER_ACTIVITY => Some(Law::DriverActivity {
+                coefficients,
+                least_share: self.least_share,
+            }),
+            _ => None,
+        }
+    }
+}
+
+words! {
+    /// Equation (9) by its coefficients; immutable once validated by [`crate::controller::params`].
+    pub struct Coefficients {
+        /// K_1*a1'.
+        pub(crate) e_y: TorquePerLength,
+        /// K_1*a2'.
+        pub(crate) e_y_rate: TorquePerSpeed,
+        /// K_1*a3'.
+        pub(crate) e_theta: TorquePerAngle,
+        /// K_1*a4'.
+        pub(crate) e_theta_rate: TorquePerTurningRate,
+        /// tau of the rate filter in 2^-8 us: a whole microsecond would cost 0.2 mN.m at the default corner.
+        pub(crate) tau: u32,
+    }
 }
 
 words! {
@@ -127,7 +187,7 @@ impl EgoMotion {
 }
 
 impl LawState {
-    /// The state from which [`Law::torque`], which continues the errors at their rates, computes the present errors and rates.
+    /// The state from which [`Coefficients::torque`], which continues the errors at their rates, computes the present errors and rates.
     /// Both errors turn with the vehicle; the near point moves aside by the way that it is ahead, and drifts at the speed
     /// times the heading, of which a third of the age counts where the heading grew with the square of the time.
     fn moved_with(&self, age: Micros, ego: &EgoMotion) -> Self {
@@ -194,7 +254,7 @@ const GAP: Micros = Micros::from_ms(100);
 /// every product of the step inside 64 bits whatever the samples are.
 pub const MAX_RATE: u32 = 1000;
 
-impl Law {
+impl Coefficients {
     /// The torque that the law demands now, from the latest sample received and the vehicle's motion since.
     #[must_use]
     pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, ego: &EgoMotion) -> Torque {

@@ -210,10 +210,6 @@ quantity!(
     CurvaturePerAngle, from_per_m, per_m, "one per metre"
 );
 quantity!(
-    /// An angle per length, rad/m.
-    AnglePerLength, from_rad_per_m, rad_per_m, "radians per metre"
-);
-quantity!(
     /// A rate of turn, rad/s, positive turns left.
     TurningRate, from_rad_per_s, rad_per_s, "radians per second"
 );

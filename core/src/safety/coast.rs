@@ -16,7 +16,7 @@
 //!
 //! Not here: how the lane is extrapolated, and what a loss leads to ([`crate::controller`]).
 
-use crate::law::LaneSample;
+use crate::lane::LaneSample;
 use crate::quantity::{Metres, Micros, Radians, Ratio, Torque, per_second};
 use crate::safety::redundant::words;
 

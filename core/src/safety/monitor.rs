@@ -15,10 +15,7 @@
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-mod fdca;
-
-use crate::safety::redundant::{Redundant, words};
-pub use fdca::Fdca;
+use crate::safety::redundant::words;
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -33,7 +30,7 @@ words! {
         pub(crate) band_mnm: i32,
         /// Amplitude of the probe.
         pub(crate) probe_mnm: i32,
-        /// Equation (9), mN.m per m, per rad, per m/s, per rad/s; the third is below zero, and the others zero, where the law is FDCA.
+        /// Equation (9), mN.m per m, per rad, per m/s, per rad/s.
         pub(crate) gains_mnm: [i32; 4],
     }
 }
@@ -95,13 +92,11 @@ pub struct Frames {
     pub column: [u8; 8],
     /// Request.
     pub request: [u8; 8],
-    /// Vehicle.
-    pub vehicle: [u8; 8],
     /// Which of them are new.
     pub new: New,
 }
 
-/// Which frames are new; the vehicle's is only ever looked up.
+/// Which frames are new.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct New {
     /// Lane preview.
@@ -118,7 +113,6 @@ impl Frames {
         lane: [0; 8],
         column: [0; 8],
         request: [0; 8],
-        vehicle: [0; 8],
         new: New {
             lane: false,
             column: false,
@@ -209,21 +203,12 @@ impl Monitor {
     /// `false` it is never renewed.
     #[must_use]
     #[inline(always)]
-    pub fn step(
-        &self,
-        state: &mut MonitorState,
-        fdca: &mut Redundant<Fdca>,
-        evidence: &Evidence<'_>,
-    ) -> bool {
+    pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if let Some(apart_us) = state.observe(evidence, elapsed_us) {
-            if self.is_fdca() {
-                ask_fdca(state, fdca, evidence, apart_us);
-            } else {
-                self.update_demand(state);
-            }
+        if state.observe(evidence, elapsed_us) {
+            self.update_demand(state);
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
@@ -263,6 +248,7 @@ impl Monitor {
 
     /// The monitor of a simulator's ECU with another law than (9): the band around (9) is as wide as the absolute limit, and
     /// so refuses nothing that the limit does not. The other rules are the product's.
+    #[cfg(feature = "another-law")]
     #[must_use]
     pub const fn with_another_law(self) -> Self {
         Self {
@@ -291,10 +277,6 @@ impl Monitor {
         }
         let shrink = beyond.saturating_mul(OVERRIDE_SLOPE);
         self.limit_mnm.saturating_sub(shrink).max(0)
-    }
-
-    const fn is_fdca(&self) -> bool {
-        self.gains_mnm[2] < 0
     }
 
     /// What a new lane sample asks for.
@@ -390,10 +372,10 @@ impl Monitor {
 }
 
 impl MonitorState {
-    /// Takes the frames that arrived. With a new lane sample, returns how much newer it is than the last.
+    /// Takes the frames that arrived. Returns whether there is a new lane sample to go by.
     #[inline(always)]
-    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> Option<i32> {
-        let mut newer = None;
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
+        let mut is_newer = false;
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
         let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
         let frames = evidence.frames;
@@ -407,7 +389,7 @@ impl MonitorState {
                 .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
                 .saturating_mul(100);
             let apart_us = self.step.age_us.saturating_sub(age_us);
-            newer = Some(apart_us);
+            is_newer = true;
             // After a gap there is no rate.
             if self.step.age_us > OLDEST_LANE_US {
                 (self.lane_state.before, self.lane_state.older_us) = (new, 0);
@@ -425,7 +407,7 @@ impl MonitorState {
         if frames.new.request && field(&frames.request, 21, 1) != 0 {
             self.step.probe_left_us = PROBE_END_US;
         }
-        newer
+        is_newer
     }
 
     /// How fast the lane errors move, mm/s and urad/s.
@@ -447,18 +429,6 @@ impl MonitorState {
             .saturating_div(span_ms)
             .saturating_mul(1000);
         (e_y_mmps, e_theta_urps)
-    }
-}
-
-/// The same of FDCA, whose copies have to agree. Not inlined, so that it costs (9) nothing.
-#[cold]
-#[inline(never)]
-fn ask_fdca(state: &mut MonitorState, fdca: &mut Redundant<Fdca>, evidence: &Evidence<'_>, apart_us: i32) {
-    if let Some((least, most)) = fdca.change(|fdca| fdca.see(state, evidence, apart_us)) {
-        state.lane_state.position_mnm = least;
-        state.lane_state.rate_mnm = most.saturating_sub(least);
-    } else {
-        state.step.withdrawn = 1;
     }
 }
 

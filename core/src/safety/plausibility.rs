@@ -36,8 +36,7 @@
 
 use fixed::types::{I0F32, I8F24, I40F24};
 
-use crate::law::LaneSample;
-use crate::law::activity::TimeAndShare;
+use crate::lane::LaneSample;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, Instant, Metres, Micros, Radians, Ratio, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
@@ -60,9 +59,10 @@ words! {
         pub(crate) column_damping: TorquePerTurningRate,
         /// t'_f, s.
         pub(crate) far_time: Seconds,
-        /// t'_n, s; and the time that the vehicle needs from the near point to the far point, at least 0.
+        /// t'_n, s.
         pub(crate) near_time: Seconds,
-        pub(crate) between: TimeAndShare,
+        /// The time that the vehicle needs from the near point to the far point, at least 0.
+        pub(crate) between: Micros,
     }
 }
 
@@ -203,11 +203,6 @@ impl PlausibilityState {
     #[must_use]
     pub const fn speed(&self) -> Speed {
         self.motion.speed
-    }
-
-    /// The yaw rate per wheel angle at that speed.
-    pub(crate) const fn turning_gain(&self) -> TurningRatePerAngle {
-        self.motion.turning_gain
     }
 
     /// Compares two speeds that arrive `passed` after the last ones. Returns whether they agree, and whether they
@@ -489,7 +484,7 @@ impl Plausibility {
         now: Instant,
         at: Instant,
     ) -> Option<I8F24> {
-        let near = motion_history.line_direction(now, at, self.between.time())?;
+        let near = motion_history.line_direction(now, at, self.between)?;
         let turning = motion_history.heading(now, at).rate;
         let along = saturate(product(state.motion.speed.fixed(), near.fixed()));
         let reach = saturate(product(self.near_time.fixed(), state.motion.speed.fixed()));
@@ -562,7 +557,7 @@ mod tests {
         column_damping: TorquePerTurningRate::from_nm_s_per_rad(0.57),
         far_time: Seconds::from_s(0.7),
         near_time: Seconds::from_s(0.3),
-        between: TimeAndShare::new(Micros::from_us(400_000), None),
+        between: Micros::from_us(400_000),
     };
 
     #[test]

@@ -1,6 +1,6 @@
 //! Laws of one's own behind the shipping ECU: the paper's, laws that lie, every law by name; and the documents' page of them.
 
-use haptic_core::controller::params::{DRIVER_ACTIVITY, FDCA};
+use haptic_core::controller::params::DRIVER_ACTIVITY;
 use haptic_core::safety::modes::Mode;
 use haptic_sim::drivers::{AnyDriver, DRIVERS, HABITS};
 use haptic_sim::guidance::{Guidance, OverBus, OwnLaw};
@@ -174,7 +174,7 @@ impl Driver for Pushes {
 /// 3 N.m for each beyond 0.8 N.m of opposition leave nothing of 5 N.m from 2.47 N.m on; the torque falls there by 8 N.m/s at least.
 #[test]
 fn a_driver_who_pushes_50_nm_has_no_guidance_against_him() {
-    for law in [0.0, DRIVER_ACTIVITY, FDCA] {
+    for law in [0.0, DRIVER_ACTIVITY] {
         for push_nm in [50.0, -50.0] {
             let mut guidance = GuidanceParameters::default();
             guidance.controller.law = law;

@@ -98,7 +98,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         (&["run", "unknown.toml"], "t_q"),
         (
             &["ecu", "parameters", "between.toml", "--can", "can0"],
-            "between.toml: guidance.law = 1.5 is not a whole number from 0 to 2",
+            "between.toml: guidance.law = 1.5 is not a whole number from 0 to 1",
         ),
         (
             &["ecu", "pil", "manual.toml"],

@@ -4,7 +4,7 @@
 //! them from a little before, one by one; the torque then has the share and the bounds of `haptic-core`'s `coast`.
 
 use haptic_core::controller::config::Config;
-use haptic_core::law::LaneSample;
+use haptic_core::lane::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
 use haptic_core::safety::coast;
 use haptic_core::safety::motion_history::MotionHistory;

@@ -262,9 +262,6 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
         law: _,
         // Without their laws they do not act.
         activity_lambda_min: _,
-        fdca_k_y_rad_per_m: _,
-        fdca_k_psi: _,
-        fdca_lohs: _,
     } = controller;
     controller
 }

@@ -77,9 +77,6 @@ class GuidanceTable(TypedDict, total=False):
     high_speed_share: float
     law: float
     activity_lambda_min: float
-    fdca_k_y_rad_per_m: float
-    fdca_k_psi: float
-    fdca_lohs: float
     t_n_s: float
     t_f_s: float
     probe: bool

@@ -15,29 +15,26 @@ fn times_are_rounded_to_the_nearest_count() {
         };
         (params.vehicle.far_time_s, params.vehicle.near_time_s) = (far_time_s, near_time_s);
         let config = Config::new(&params).unwrap();
-        assert_eq!(config.plausibility.between.time(), Micros::from_us(between_us));
-        assert_eq!(config.law.tau, tau, "{rate_corner_hz}");
+        assert_eq!(config.plausibility.between, Micros::from_us(between_us));
+        assert_eq!(config.law().unwrap().coefficients().tau, tau, "{rate_corner_hz}");
     }
 }
 
-/// The longest look-ahead, 3 s, and lambda_min share a word; only driver activity has a lambda_min, also one of zero.
+/// Only driver activity has a lambda_min.
 #[test]
-fn time_and_least_share_share_a_word() {
-    for (law, lambda_min, share) in [
-        (0.0, 1.0, None),
-        (1.0, 0.0, Some(0.0)),
-        (1.0, 1.0, Some(1.0)),
-        (2.0, 1.0, None),
-    ] {
-        let mut params = Params {
+fn the_number_of_a_law_chooses_its_variant() {
+    for (law, least_share) in [(0.0, None), (1.0, Some(Ratio::from_si(0.05)))] {
+        let params = Params {
             law,
-            activity_lambda_min: lambda_min,
+            activity_lambda_min: 0.05,
             ..Params::PAPER
         };
-        (params.vehicle.far_time_s, params.vehicle.near_time_s) = (3.0, 0.0);
-        let between = Config::new(&params).unwrap().plausibility.between;
-        assert_eq!(between.time(), Micros::from_us(3_000_000));
-        assert_eq!(between.least_share(), share.map(LeastShare::from_si), "{law}");
+        let found = match Config::new(&params).unwrap().law() {
+            Some(Law::DriverActivity { least_share, .. }) => Some(least_share),
+            Some(Law::Paper(_)) => None,
+            None => panic!("{law} is a law"),
+        };
+        assert_eq!(found, least_share, "{law}");
     }
 }
 

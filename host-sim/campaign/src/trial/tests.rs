@@ -252,9 +252,9 @@ fn drivers_change_who_drives_and_nothing_else() {
     assert!(names.len() > 55, "{names:?}");
 }
 
-/// What runs a failure again says who drove where it is not who usually does.
+/// What runs a failure again says who drove, and which law, where they are not the usual ones.
 #[test]
-fn a_replay_names_world_and_drivers() {
+fn a_replay_names_world_drivers_and_law() {
     let everything = || {
         World::new(Some(
             WORLDS.iter().find(|world| world.name == "everything").unwrap(),
@@ -269,6 +269,10 @@ fn a_replay_names_world_and_drivers() {
     assert_eq!(
         World::new(None).driven_by(Drivers::Population).arguments(),
         " --drivers population"
+    );
+    assert_eq!(
+        everything().guided_by(1).arguments(),
+        " --world everything --law driver_activity"
     );
 }
 

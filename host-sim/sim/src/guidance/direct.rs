@@ -4,7 +4,7 @@
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
 use haptic_core::controller::{Controller, ControllerState};
-use haptic_core::law::LaneSample;
+use haptic_core::lane::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_core::safety::faults::FaultSet;
 
