@@ -2,6 +2,7 @@
 //! counters of its own frames. Firmware and simulator carry bytes to it and from it, nothing more.
 
 mod another_law;
+mod counting;
 #[cfg(feature = "fault-injection")]
 pub mod injection;
 mod receivers;
