@@ -72,31 +72,29 @@ fn send(machine: &mut Machine, params: &Params, in_use: u32, without: Option<usi
         yaw_rate: None,
     };
     // A hundred messages in a row, behind the three of a new sender.
-    for counter in 0..104 {
-        machine.send(&slcan::format(&standing.encode(counter)));
+    let mut counter = 0;
+    let mut send = |frame: Option<&Frame>| {
+        let frames = [standing.encode(counter)].into_iter().chain(frame.copied());
+        counter = counter.wrapping_add(1);
+        machine.send(
+            &frames
+                .flat_map(|frame| slcan::format(&frame))
+                .collect::<Vec<u8>>(),
+        );
         // Ten milliseconds of the machine's time: torque frames come one in each.
         for _ in 0..10 {
             while machine.frame().0 != 0x0C0 {}
         }
-    }
-    // The machine does not wait for this client: with a speed before every frame none of them meets an old one, and all
-    // go out in one piece.
-    let mut counter = 104;
-    let mut piece = Vec::new();
-    let mut send_standing = |frame: &Frame| {
-        for _ in 0..4 {
-            piece.extend_from_slice(&slcan::format(&standing.encode(counter)));
-            counter = counter.wrapping_add(1);
-        }
-        piece.extend_from_slice(&slcan::format(frame));
     };
-    send_standing(&download::unlock(in_use, 0));
+    for _ in 0..104 {
+        send(None);
+    }
+    send(Some(&download::unlock(in_use, 0)));
     for (index, frame) in download::frames(params).iter().enumerate() {
         if without != Some(index) {
-            send_standing(frame);
+            send(Some(frame));
         }
     }
-    machine.send(&piece);
 }
 
 const IN_USE: fn(u64, u64) -> Status = |sequence, outcome| Status {

@@ -56,6 +56,11 @@ const fn in_mode(mode: Mode) -> Conditions {
     Conditions { mode, ..READY }
 }
 
+/// When a client sends its frame of that number, ms after the unlock.
+fn due_ms(frame: usize) -> u32 {
+    4 * frame as u32
+}
+
 /// A receiver that was unlocked.
 fn unlocked() -> Download {
     let mut download = Download::NEW;
@@ -66,9 +71,14 @@ fn unlocked() -> Download {
 /// What such a receiver makes of frames.
 fn receive(frames: &[Frame], mode: Mode) -> (Option<Set>, WriteOutcome) {
     let mut download = unlocked();
+    let at = |index| Conditions {
+        now_ms: due_ms(index),
+        ..in_mode(mode)
+    };
     let taken = frames
         .iter()
-        .filter_map(|frame| download.receive(frame, &in_mode(mode)))
+        .enumerate()
+        .filter_map(|(index, frame)| download.receive(frame, &at(index)))
         .last();
     (taken, download.status(None, false).outcome)
 }
@@ -280,16 +290,17 @@ fn a_refused_set_can_be_sent_again() {
     for frame in &frames(&SET)[1..] {
         assert_eq!(download.receive(frame, &READY), None);
     }
+    let at = |now_ms| Conditions { now_ms, ..READY };
     let again = |download: &mut Download| {
-        frames(&SET)
-            .iter()
-            .filter_map(|frame| download.receive(frame, &READY))
+        let sent = frames(&SET);
+        let sent = sent.iter().enumerate();
+        sent.filter_map(|(index, frame)| download.receive(frame, &at(400 + due_ms(index))))
             .last()
     };
     // An unlock is for one attempt.
     assert_eq!(again(&mut download), None);
     assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
-    download.receive(&unlock(7, VEHICLE), &READY);
+    download.receive(&unlock(7, VEHICLE), &at(400));
     assert_eq!(again(&mut download), Some(TAKEN));
     assert_eq!(again(&mut download), None, "and for one set");
 }
@@ -310,7 +321,7 @@ fn the_status_names_the_set_in_use() {
     );
 }
 
-/// Four bits have room for sixteen outcomes; there are nine.
+/// Four bits have room for sixteen outcomes; there are ten.
 #[test]
 fn a_status_with_an_outcome_that_is_none_is_refused() {
     let status = |code: u8| {
@@ -323,7 +334,8 @@ fn a_status_with_an_outcome_that_is_none_is_refused() {
     };
     assert_eq!(status(5).map(|status| status.outcome), Ok(WriteOutcome::Taken));
     assert_eq!(status(8).map(|status| status.outcome), Ok(WriteOutcome::TooSoon));
-    for code in 9..16 {
+    assert_eq!(status(9).map(|status| status.outcome), Ok(WriteOutcome::TooFast));
+    for code in 10..16 {
         assert_eq!(status(code), Err(Reject::Range));
     }
 }
@@ -351,7 +363,8 @@ fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
         for at in [0, 9, 18] {
             let mut download = unlocked();
             let taken = frames(&SET).iter().enumerate().any(|(i, frame)| {
-                let now = if i == at { conditions } else { READY };
+                let mut now = if i == at { conditions } else { READY };
+                now.now_ms += due_ms(i);
                 download.receive(frame, &now).is_some()
             });
             assert!(!taken, "{outcome:?} at {at}");
@@ -367,13 +380,58 @@ fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
         ..READY
     };
     download.receive(&unlock(7, VEHICLE), &begin);
+    // The last field comes at that time.
     let taken_at = |now_ms: u32| {
-        let (mut download, end) = (download.clone(), Conditions { now_ms, ..READY });
-        frames(&SET)
-            .iter()
-            .any(|frame| download.receive(frame, &end).is_some())
+        let (mut download, sent) = (download.clone(), frames(&SET));
+        let at = |index| Conditions {
+            now_ms: now_ms.wrapping_sub(due_ms(sent.len() - 1 - index)),
+            ..READY
+        };
+        let mut sent = sent.iter().enumerate();
+        sent.any(|(index, frame)| download.receive(frame, &at(index)).is_some())
     };
     assert!(taken_at(UNLOCK_MS - 6) && !taken_at(UNLOCK_MS - 5));
+}
+
+/// A set in one burst, as whoever slips one in behind another's unlock sends it: a field takes 4 ms but for the first twelve.
+#[test]
+fn a_set_takes_its_time() {
+    let sent = frames(&SET);
+    let outcome = |ms_of: fn(usize) -> u32| {
+        let mut download = unlocked();
+        for (index, frame) in sent.iter().enumerate() {
+            let now_ms = ms_of(index);
+            download.receive(frame, &Conditions { now_ms, ..READY });
+        }
+        download.status(None, false).outcome
+    };
+    assert_eq!(outcome(|_| 0), WriteOutcome::TooFast);
+    assert_eq!(outcome(|index| 10 * index as u32), WriteOutcome::Taken);
+    assert_eq!(
+        outcome(|index| 4 * index.saturating_sub(12) as u32),
+        WriteOutcome::Taken
+    );
+    assert_eq!(
+        outcome(|index| (4 * index.saturating_sub(12)).saturating_sub(1) as u32),
+        WriteOutcome::TooFast
+    );
+}
+
+/// Two unlocks within 0.4 s are of two senders: neither unlocks.
+#[test]
+fn two_unlocks_at_once_unlock_nothing() {
+    for (apart_ms, is_taken) in [(0, false), (399, false), (400, true)] {
+        let mut download = unlocked();
+        let at = |ms| Conditions {
+            now_ms: apart_ms + ms,
+            ..READY
+        };
+        download.receive(&unlock(7, VEHICLE), &at(0));
+        let sent = frames(&SET);
+        let mut sent = sent.iter().enumerate();
+        let taken = sent.any(|(index, frame)| download.receive(frame, &at(due_ms(index))).is_some());
+        assert_eq!(taken, is_taken, "{apart_ms} ms");
+    }
 }
 
 /// A download that was recorded unlocks with the number of a set that is no longer in use.
@@ -462,11 +520,16 @@ fn whatever_comes_a_set_is_taken_only_as_the_rules_say() {
     // The field that comes next, none after a refusal; until when it is unlocked; the values of k_1 of this set.
     let (mut next, mut until, mut is_bad, mut outcome) = (Some(0), None, false, WriteOutcome::None);
     let (mut now_ms, mut vehicle, mut in_order) = (u32::MAX - 50_000, 0, 0);
-    let mut counts = [0; 9];
-    for _ in 0..100_000 {
-        now_ms = now_ms.wrapping_add(
-            [rng.random_range(0..5), rng.random_range(1900..2100)][usize::from(rng.random_bool(0.004))],
-        );
+    let (mut asked, mut began) = (None, 0);
+    let mut counts = [0; 10];
+    for _ in 0..200_000 {
+        // Between two sets there is time, within one there may be too little.
+        let passes_ms = match in_order {
+            0 => rng.random_range(0..800),
+            _ if rng.random_bool(0.004) => rng.random_range(1900..2100),
+            _ => rng.random_range(0..[2, 9][vehicle as usize % 2]),
+        };
+        now_ms = now_ms.wrapping_add(passes_ms);
         let mut here = Conditions { now_ms, ..READY };
         match rng.random_range(0..800) {
             0 => here.mode = Mode::ALL[rng.random_range(0..7)],
@@ -478,7 +541,9 @@ fn whatever_comes_a_set_is_taken_only_as_the_rules_say() {
             let in_use = if rng.random_bool(0.8) { 7 } else { 8 };
             vehicle = rng.random_range(0..1 << 20);
             assert_eq!(download.receive(&unlock(in_use, vehicle), &here), None);
-            until = (in_use == 7).then(|| now_ms.wrapping_add(UNLOCK_MS));
+            let is_alone = asked.is_none_or(|at| now_ms.wrapping_sub(at) >= 400);
+            asked = Some(now_ms);
+            until = (in_use == 7 && is_alone).then(|| now_ms.wrapping_add(UNLOCK_MS));
             continue;
         }
         let index = if rng.random_bool(0.003) {
@@ -491,7 +556,7 @@ fn whatever_comes_a_set_is_taken_only_as_the_rules_say() {
         let taken = download.receive(&[good[index], bad[index]][usize::from(sends_bad)], &here);
         let mut expected = None;
         if index == 0 {
-            (next, is_bad) = (Some(0), sends_bad);
+            (next, is_bad, began) = (Some(0), sends_bad, now_ms);
         }
         if let Some(due) = next {
             let is_unlocked = until.is_some_and(|until: u32| until.wrapping_sub(now_ms) <= UNLOCK_MS);
@@ -500,6 +565,7 @@ fn whatever_comes_a_set_is_taken_only_as_the_rules_say() {
                 () if !here.stands => WriteOutcome::NotStanding,
                 () if !here.settled => WriteOutcome::TooSoon,
                 () if !is_unlocked => WriteOutcome::NotUnlocked,
+                () if index as u32 > now_ms.wrapping_sub(began) / 4 + 12 => WriteOutcome::TooFast,
                 () if index != due => WriteOutcome::OutOfOrder,
                 () if due + 1 < good.len() => WriteOutcome::Receiving,
                 () if is_bad => WriteOutcome::OutOfRange,

@@ -18,6 +18,8 @@ mod frame;
 mod frozen_torque;
 mod fuzz;
 mod hands;
+mod honest;
+mod interleaved;
 mod law_oracle;
 mod laws;
 mod long_message;

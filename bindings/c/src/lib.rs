@@ -70,6 +70,10 @@ pub enum Status {
     RejectOlder = 23,
     /// `HG_REJECT_OWN_IDENTIFIER`
     RejectOwnIdentifier = 24,
+    /// `HG_REJECT_TOO_FAST`
+    RejectTooFast = 25,
+    /// `HG_REJECT_TWO_SENDERS`
+    RejectTwoSenders = 26,
     /// `HG_REJECT_OTHER`
     RejectOther = 31,
 }
@@ -86,6 +90,8 @@ impl From<Reject> for Status {
             Reject::Step => Self::RejectStep,
             Reject::Older => Self::RejectOlder,
             Reject::OwnIdentifier => Self::RejectOwnIdentifier,
+            Reject::TooFast => Self::RejectTooFast,
+            Reject::TwoSenders => Self::RejectTwoSenders,
             _ => Self::RejectOther,
         }
     }

@@ -12,7 +12,8 @@
 //! The receiver rejects a bad frame and continues with the next. A sender that was silent beyond its time-out has to
 //! send three clean frames in a row before it is trusted again. Terms: *delta* is the counter's step from the last
 //! accepted frame, modulo 16; *clean* is a frame that is intact, the next in count, and in range. (A lane preview
-//! that is marked as not valid counts as clean.)
+//! that is marked as not valid counts as clean.) Time is not known here: how fast the ECU's own receivers let a counter go on
+//! is said in `core/src/ecu/counting.rs`.
 
 use crc::{CRC_8_AUTOSAR, Crc};
 
@@ -124,11 +125,15 @@ pub enum Reject {
     Older,
     /// The identifier is this ECU's: another node sends in its name.
     OwnIdentifier,
+    /// The counter went on faster than any sender counts, or twice as fast as this one did.
+    TooFast,
+    /// Two senders count under one identifier, and neither is believed.
+    TwoSenders,
 }
 
 impl Reject {
     /// Every reason, in the order of its codes on the bus.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Length,
         Self::Crc,
         Self::Repeated,
@@ -138,6 +143,8 @@ impl Reject {
         Self::Step,
         Self::Older,
         Self::OwnIdentifier,
+        Self::TooFast,
+        Self::TwoSenders,
     ];
 
     /// The reason of a code on the bus.
@@ -177,6 +184,12 @@ impl ReceiverState {
         self.clean >= CLEAN_FRAMES_TO_TRUST
     }
 
+    /// The step from the last counter, modulo 16; `None` before the first.
+    #[inline(always)]
+    pub(crate) fn delta(&self, counter: u8) -> Option<u8> {
+        (self.last != NONE).then(|| counter.wrapping_sub(self.last) & 0x0F)
+    }
+
     /// Checks a frame and stores its counter. `max_delta` is the largest step of the counter that lost frames within
     /// the message's time-out explain.
     ///
@@ -185,7 +198,7 @@ impl ReceiverState {
     #[inline(always)]
     pub fn accept(&mut self, protection: &Protection, data: &[u8], max_delta: u8) -> Result<(), Reject> {
         let counter = protection.intact_counter(data).ok_or(Reject::Crc)?;
-        let delta = (self.last != NONE).then(|| counter.wrapping_sub(self.last) & 0x0F);
+        let delta = self.delta(counter);
         if !self.is_trusted() {
             self.clean = if delta == Some(1) {
                 self.clean.saturating_add(1)

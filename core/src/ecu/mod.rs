@@ -3,6 +3,7 @@
 
 #[cfg(feature = "another-law")]
 mod another_law;
+mod counting;
 #[cfg(feature = "fault-injection")]
 pub mod injection;
 mod receivers;

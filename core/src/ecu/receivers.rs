@@ -3,6 +3,7 @@
 //! Each receiver is kept twice by itself, so that a frame costs the comparison of one. Not here: what the values lead to
 //! ([`crate::controller`]).
 
+use super::counting::{Counting, Periods};
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{Column, LanePreview, Message, Request, Sender, TIMEOUT, Vehicle, sender_of};
 use crate::bus::{Frame, Reject};
@@ -35,6 +36,7 @@ pub(super) struct Slot<T> {
     /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason. Of speeds, how many
     /// messages in a row had one that stepped.
     doubt: u8,
+    counting: Counting,
     /// When the value arrived.
     at: Instant,
     /// The sender's period, at least [`LEAST_PERIOD`].
@@ -42,12 +44,20 @@ pub(super) struct Slot<T> {
     value: T,
 }
 
-/// The slowest sender of each input that is waited for: a camera of 15 Hz, a column and a vehicle's bus as they are in
-/// cars. Three periods without a message are a loss, and 30 ms at least.
-const LANE_PERIOD: Micros = Micros::from_us(66_667);
-const COLUMN_PERIOD: Micros = Micros::from_ms(20);
-const MOTION_PERIOD: Micros = Micros::from_ms(25);
-const REQUEST_PERIOD: Micros = Micros::from_ms(25);
+/// The senders of each input: up to 200 frames a second, a column wired to the board 1000; down to a camera of 15 Hz, a column
+/// and a vehicle's bus as they are in cars. Three periods without a message are a loss, and 30 ms at least.
+const LANE: Periods = Periods {
+    fastest: Micros::from_ms(4),
+    slowest: Micros::from_us(66_667),
+};
+const COLUMN: Periods = Periods {
+    fastest: Micros::from_us(800),
+    slowest: Micros::from_ms(20),
+};
+const HOST: Periods = Periods {
+    fastest: Micros::from_ms(4),
+    slowest: Micros::from_ms(25),
+};
 /// A sender's period is forgotten within 2^6 of its messages: half a second of a camera of 120 Hz.
 const PERIOD_SHIFT: u32 = 6;
 /// A sender whose messages come closer is waited for as long as one of this: [`TIMEOUT`].
@@ -84,6 +94,7 @@ impl<T: Words> Words for Slot<T> {
             e2e: ReceiverState { last, clean },
             state,
             doubt,
+            counting: self.counting.map_words(change),
             at: self.at.map_words(change),
             period: self.period.map_words(change),
             value: self.value.map_words(change),
@@ -93,6 +104,7 @@ impl<T: Words> Words for Slot<T> {
     #[inline(always)]
     fn agreement(&self, other: &Self) -> u32 {
         self.head().agreement(&other.head())
+            & self.counting.agreement(&other.counting)
             & self.at.agreement(&other.at)
             & self.period.agreement(&other.period)
             & self.value.agreement(&other.value)
@@ -110,16 +122,57 @@ impl<T: Words> Slot<T> {
             e2e,
             state: LOST,
             doubt: 0,
+            counting: Counting::NEW,
             at: now,
             period: Micros::from_us(0),
             value,
         }
     }
 
+    /// Checks a frame and decodes it: [`Message::decode_within`], with the time that counting takes.
+    fn decode<M: Message>(
+        &mut self,
+        frame: &Frame,
+        max_delta: u8,
+        now: Instant,
+        periods: &Periods,
+    ) -> Result<M, Reject> {
+        let before = self.e2e;
+        let decoded = M::decode_within(&mut self.e2e, frame, max_delta);
+        let is_counted = match decoded {
+            Err(Reject::Length | Reject::Crc) => false,
+            // The counter of a sender that is not trusted is not looked at then.
+            Err(Reject::Range) => self.e2e != before,
+            _ => true,
+        };
+        if !is_counted {
+            return decoded;
+        }
+        let [_, head, ..] = *frame.bytes();
+        match before.delta(head & 0x0F) {
+            None => self.counting.begin(frame, now, periods),
+            Some(ahead) if (1..=max_delta).contains(&ahead) => {
+                if !self.counting.go_on(ahead, frame, now, periods) {
+                    self.e2e = before;
+                    return Err(Reject::TooFast);
+                }
+            }
+            Some(ahead) => {
+                if self.counting.is_contradicted(ahead, frame) {
+                    (self.state, self.doubt, self.e2e) = (LOST, 0, ReceiverState::NEW);
+                }
+            }
+        }
+        if self.counting.is_distrusted() {
+            return decoded.and(Err(Reject::TwoSenders));
+        }
+        decoded
+    }
+
     /// Takes a value heard now. The sender's period is the longest time between two of its messages lately: it grows at
     /// once and falls by a sixty-fourth of the way, so that a sender whose messages jitter is waited for as long as its gaps
     /// are. Unknown, it is the `slowest`, and then the first time between two messages, but no less than a quarter of that.
-    fn put(&mut self, value: T, now: Instant, slowest: Micros) {
+    fn put(&mut self, value: T, now: Instant, Periods { slowest, .. }: &Periods) {
         let (period, apart) = (self.period.us(), now.since(self.at).us().min(slowest.us()));
         let period = if self.state == LOST {
             slowest.us()
@@ -198,7 +251,7 @@ fn take_preview(slot: &mut Slot<LaneSample>, lane: &LanePreview, now: Instant) -
     if lane.age > OLDEST_SAMPLE {
         return Err(Reject::Older);
     }
-    slot.put(sample, now, LANE_PERIOD);
+    slot.put(sample, now, &LANE);
     Ok(())
 }
 
@@ -348,7 +401,7 @@ impl Receivers {
         } = self;
         match frame.id() {
             LanePreview::ID => self.lane.change(|slot| {
-                let preview = LanePreview::decode(&mut slot.e2e, frame)?;
+                let preview = slot.decode::<LanePreview>(frame, LanePreview::MAX_DELTA, now, &LANE)?;
                 take_preview(slot, &preview, now)?;
                 if preview.valid {
                     (frames.new.lane, frames.lane) = (true, *frame.bytes());
@@ -356,22 +409,22 @@ impl Receivers {
                 Ok(())
             }),
             Column::ID => self.column.change(|slot| {
-                let c = Column::decode_within(&mut slot.e2e, frame, column_window(now.since(slot.at)))?;
+                let c = slot.decode::<Column>(frame, column_window(slot, now), now, &COLUMN)?;
                 let column = ColumnState {
                     driver_torque: c.driver_torque,
                     wheel_angle: c.wheel_angle,
                 };
-                slot.put(column, now, COLUMN_PERIOD);
+                slot.put(column, now, &COLUMN);
                 actuator.deliver(c.motor_torque);
                 (frames.new.column, frames.column) = (true, *frame.bytes());
                 Ok(())
             }),
             Vehicle::ID => {
                 let heard = self.motion.change(|slot| {
-                    let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
+                    let Vehicle { speeds, yaw_rate } = slot.decode(frame, Vehicle::MAX_DELTA, now, &HOST)?;
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
                     standing.hear(speeds, now.since(slot.at));
-                    slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
+                    slot.put(Motion::new(speeds, yaw_rate), now, &HOST);
                     Ok(())
                 });
                 if heard != Some(Ok(())) {
@@ -380,13 +433,13 @@ impl Receivers {
                 heard
             }
             Request::ID => self.request.change(|slot| {
-                let request = Request::decode(&mut slot.e2e, frame)?;
+                let request: Request = slot.decode(frame, Request::MAX_DELTA, now, &HOST)?;
                 let request = RequestWords {
                     engage: u16::from(request.engage),
                     probe: u16::from(request.probe),
                     authority: request.authority,
                 };
-                slot.put(request, now, REQUEST_PERIOD);
+                slot.put(request, now, &HOST);
                 (frames.new.request, frames.request) = (true, *frame.bytes());
                 Ok(())
             }),
@@ -443,10 +496,13 @@ impl Receivers {
 }
 
 /// The largest step of the column's counter to accept after a silence: three at first, more the longer it lasts. A narrow window
-/// lets few of the sixteen counters of a replayed frame pass.
+/// lets few of the sixteen counters of a replayed frame pass. After a loss nothing is in use that a step could lead on from.
 #[expect(clippy::as_conversions, reason = "at most 14")]
-fn column_window(silence: Micros) -> u8 {
-    let periods = silence.us() / COLUMN_PERIOD_US;
+fn column_window(slot: &Slot<ColumnState>, now: Instant) -> u8 {
+    if slot.state == LOST {
+        return Column::MAX_DELTA;
+    }
+    let periods = now.since(slot.at).us() / COLUMN_PERIOD_US;
     periods.saturating_add(u32::from(Column::MAX_DELTA)).min(14) as u8
 }
 
@@ -462,7 +518,7 @@ mod tests {
             ..LaneSample::default()
         };
         let mut slot = Slot::new(ReceiverState::NEW, sample, start);
-        slot.put(sample, start, LANE_PERIOD);
+        slot.put(sample, start, &LANE);
         let lane = LanePreview {
             valid: true,
             age,

@@ -6,7 +6,8 @@
 //!
 //! A set is taken in Standby only, or where the ECU is locked for want of one; while the vehicle stands, by both of its
 //! speeds; within two seconds of a [`ParameterUnlock`] that names the set in use, so that a recorded download is none;
-//! and not within ten seconds of a reset, which each set causes. None of this is a secret: it keeps a set from coming by
+//! and not within ten seconds of a reset, which each set causes. A set takes time: whoever slips one in behind another's unlock
+//! is interrupted by the fields of that one. None of this is a secret: it keeps a set from coming by
 //! accident, in traffic, or in a stream that wears out the flash, and no more (`docs/security.md`).
 //!
 //! Nothing here touches the running controller: a set takes effect when the ECU starts with it. Not here: the memory.
@@ -28,6 +29,11 @@ const VALUES: usize = PARAMETERS.len();
 const REFUSED: usize = usize::MAX;
 /// An unlock lasts for so long, ms.
 pub const UNLOCK_MS: u32 = 2000;
+/// Two unlocks that come closer, ms, are of two senders, and unlock nothing.
+const UNLOCK_APART_MS: u32 = 400;
+/// A field takes so long, ms, but for the first ones, which may have waited: clients send one in 10 ms.
+const FIELD_MS: u32 = 4;
+const FIELDS_AT_ONCE: u32 = 12;
 
 /// The ECU's situation when a frame arrives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +111,9 @@ pub struct Download {
     /// When it was unlocked, and for a set for which vehicle.
     unlocked_ms: Option<u32>,
     vehicle: u32,
+    /// When the last unlock came, and the first field of this set.
+    asked_ms: Option<u32>,
+    began_ms: u32,
     outcome: WriteOutcome,
 }
 
@@ -115,6 +124,8 @@ impl Download {
         next: 0,
         unlocked_ms: None,
         vehicle: 0,
+        asked_ms: None,
+        began_ms: 0,
         outcome: WriteOutcome::None,
     };
 
@@ -125,7 +136,9 @@ impl Download {
             ParameterUnlock::ID => {
                 let unlock = ParameterUnlock::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
                 let is_right = unlock.sequence == conditions.in_use;
-                self.unlocked_ms = is_right.then_some(conditions.now_ms);
+                let before = self.asked_ms.replace(conditions.now_ms);
+                let is_alone = before.is_none_or(|at| conditions.now_ms.wrapping_sub(at) >= UNLOCK_APART_MS);
+                self.unlocked_ms = (is_right && is_alone).then_some(conditions.now_ms);
                 self.vehicle = unlock.vehicle;
                 return None;
             }
@@ -136,7 +149,7 @@ impl Download {
         let write = ParameterWrite::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
         let index = usize::from(write.index);
         if index == 0 {
-            self.next = 0;
+            (self.next, self.began_ms) = (0, conditions.now_ms);
         } else if self.next == REFUSED {
             // The rest of a refused set keeps the reason.
             return None;
@@ -145,11 +158,14 @@ impl Download {
         let is_unlocked = self
             .unlocked_ms
             .is_some_and(|at| conditions.now_ms.wrapping_sub(at) <= UNLOCK_MS);
+        let took_ms = conditions.now_ms.wrapping_sub(self.began_ms);
+        let most = (took_ms / FIELD_MS).saturating_add(FIELDS_AT_ONCE);
         self.outcome = match slot {
             _ if conditions.mode != Mode::Standby => WriteOutcome::NotInStandby,
             _ if !conditions.stands => WriteOutcome::NotStanding,
             _ if !conditions.settled => WriteOutcome::TooSoon,
             _ if !is_unlocked => WriteOutcome::NotUnlocked,
+            _ if u32::from(write.index) > most => WriteOutcome::TooFast,
             Some(slot) => {
                 *slot = f64::from(write.value);
                 WriteOutcome::Receiving

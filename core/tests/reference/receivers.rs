@@ -71,11 +71,41 @@ fn signed(word: u64, start: u32, bits: u32) -> i64 {
     (word << (64 - start - bits)) as i64 >> (64 - bits)
 }
 
+/// How a sender counts: the time that it has left for counts, its mean time between two, and what speaks for a second one.
+#[derive(Debug, Clone, Default)]
+struct Counting {
+    at: i64,
+    left_us: i64,
+    pace_us: i64,
+    last: [u8; 8],
+    skipped: bool,
+    against: i64,
+    distrust: i64,
+}
+
+impl Counting {
+    /// So many counts on; `false` where there is no time for them.
+    fn count(&mut self, ahead: i64, now: i64, [fastest_us, slowest_us]: [i64; 2]) -> bool {
+        let each_us = fastest_us.max(self.pace_us / 2);
+        let left_us = self.left_us + (now - self.at) - ahead * each_us;
+        if left_us < 0 {
+            return false;
+        }
+        self.left_us = left_us.min(12 * each_us);
+        let apart_us = ((now - self.at) / ahead).min(slowest_us);
+        self.pace_us = self.pace_us - self.pace_us / 32 + apart_us / 32;
+        self.at = now;
+        true
+    }
+}
+
 /// One sender.
 #[derive(Debug, Clone)]
 struct Sender<T> {
     constant: u8,
+    fastest_us: i64,
     slowest_us: i64,
+    counting: Counting,
     counter: Option<u8>,
     clean: u32,
     value: Option<T>,
@@ -87,10 +117,12 @@ struct Sender<T> {
 }
 
 impl<T: Copy> Sender<T> {
-    fn new(constant: u8, slowest_us: i64, now: i64) -> Self {
+    fn new(constant: u8, [fastest_us, slowest_us]: [i64; 2], now: i64) -> Self {
         Self {
             constant,
+            fastest_us,
             slowest_us,
+            counting: Counting::default(),
             counter: None,
             clean: 0,
             value: None,
@@ -101,7 +133,13 @@ impl<T: Copy> Sender<T> {
         }
     }
 
-    fn accept(&mut self, frame: &Frame, is_in_range: impl Fn(u64) -> bool, most: i64) -> Result<u64, Reject> {
+    fn accept(
+        &mut self,
+        frame: &Frame,
+        now: i64,
+        is_in_range: impl Fn(u64) -> bool,
+        most: i64,
+    ) -> Result<u64, Reject> {
         let data: [u8; 8] = frame.data().try_into().map_err(|_| Reject::Length)?;
         let word = u64::from_le_bytes(data);
         let is_trusted = self.clean >= 3;
@@ -113,22 +151,67 @@ impl<T: Copy> Sender<T> {
             return Err(Reject::Crc);
         }
         let ahead = self.counter.map(|last| i64::from((counter + 16 - last) % 16));
-        if !is_trusted {
-            self.clean = if ahead == Some(1) { self.clean + 1 } else { 1 };
-            self.counter = Some(counter);
-            if self.clean < 3 {
-                return Err(Reject::NotTrusted);
+        let periods_us = [self.fastest_us, self.slowest_us];
+        let counting = &mut self.counting;
+        let mut is_one_too_many = false;
+        match ahead {
+            None => {
+                (counting.at, counting.pace_us) = (now, self.fastest_us);
+                (counting.left_us, counting.last, counting.skipped) = (12 * self.fastest_us, data, false);
             }
-        } else if ahead == Some(0) {
-            return Err(Reject::Repeated);
-        } else if ahead.is_some_and(|ahead| ahead > most) {
-            return Err(Reject::Jump);
+            Some(ahead) if 0 < ahead && ahead <= most => {
+                if !counting.count(ahead, now, periods_us) {
+                    counting.distrust = if counting.distrust > 0 { 128 } else { 0 };
+                    return Err(Reject::TooFast);
+                }
+                (counting.last, counting.skipped) = (data, ahead > 1);
+                counting.against = (counting.against - 1).max(0);
+                counting.distrust = (counting.distrust - 1).max(0);
+            }
+            Some(0) if data == counting.last => counting.skipped = false,
+            Some(15) if counting.skipped => counting.skipped = false,
+            Some(_) => {
+                counting.against += 8;
+                is_one_too_many = counting.against >= 128;
+                if is_one_too_many {
+                    counting.against = 0;
+                }
+                if is_one_too_many || counting.distrust > 0 {
+                    counting.distrust = 128;
+                }
+            }
         }
-        self.counter = Some(counter);
-        if is_in_range(word) {
-            Ok(word)
+        let is_distrusted = counting.distrust > 0;
+        if is_one_too_many {
+            (self.value, self.doubt) = (None, 0);
+        }
+        let judged = if is_trusted {
+            match ahead {
+                Some(0) => Err(Reject::Repeated),
+                Some(ahead) if ahead > most => Err(Reject::Jump),
+                _ => Ok(()),
+            }
         } else {
+            self.clean = if ahead == Some(1) { self.clean + 1 } else { 1 };
+            if self.clean < 3 {
+                Err(Reject::NotTrusted)
+            } else {
+                Ok(())
+            }
+        };
+        if !is_trusted || judged.is_ok() {
+            self.counter = Some(counter);
+        }
+        if is_one_too_many {
+            (self.clean, self.counter) = (0, None);
+        }
+        judged?;
+        if !is_in_range(word) {
             Err(Reject::Range)
+        } else if is_distrusted {
+            Err(Reject::TwoSenders)
+        } else {
+            Ok(word)
         }
     }
 
@@ -187,10 +270,10 @@ pub(crate) struct Seen {
 impl Receivers {
     pub(crate) fn new(now: i64) -> Self {
         Self {
-            lane: Sender::new(0x11, 66_667, now),
-            column: Sender::new(0x22, 20_000, now),
-            motion: Sender::new(0x33, 25_000, now),
-            request: Sender::new(0x44, 25_000, now),
+            lane: Sender::new(0x11, [4000, 66_667], now),
+            column: Sender::new(0x22, [800, 20_000], now),
+            motion: Sender::new(0x33, [4000, 25_000], now),
+            request: Sender::new(0x44, [4000, 25_000], now),
             motor: MotorCheck::default(),
             foreign: 0,
             at_most: 0.0,
@@ -208,7 +291,7 @@ impl Receivers {
         match frame.id() {
             0x100 => self.receive_lane(frame, now),
             0x110 => {
-                let silence = now - self.column.at;
+                let silence = self.column.value.map_or(0, |_| now - self.column.at);
                 let fields = |word| (signed(word, 12, 18), signed(word, 30, 18), signed(word, 48, 16));
                 let in_range = |word| {
                     let (driver, wheel, motor) = fields(word);
@@ -216,7 +299,7 @@ impl Receivers {
                 };
                 let word = self
                     .column
-                    .accept(frame, in_range, (silence / 2000 + 3).min(14))?;
+                    .accept(frame, now, in_range, (silence / 2000 + 3).min(14))?;
                 let (driver, wheel, motor) = fields(word);
                 let column = Column {
                     driver: driver as f64 / 4096.0,
@@ -235,7 +318,7 @@ impl Receivers {
             }
             0x130 => {
                 let in_range = |word| unsigned(word, 13, 8) <= 128;
-                let word = self.request.accept(frame, in_range, 3)?;
+                let word = self.request.accept(frame, now, in_range, 3)?;
                 let request = Request {
                     engage: unsigned(word, 12, 1) == 1,
                     authority: unsigned(word, 13, 8) as f64 / 128.0,
@@ -254,7 +337,7 @@ impl Receivers {
 
     fn receive_lane(&mut self, frame: &Frame, now: i64) -> Result<(), Reject> {
         let in_range = |word| signed(word, 12, 17).abs() <= 32_768 && signed(word, 29, 17).abs() <= 32_768;
-        let word = self.lane.accept(frame, in_range, 3)?;
+        let word = self.lane.accept(frame, now, in_range, 3)?;
         self.lane.doubt = i64::from(unsigned(word, 55, 1) == 0);
         if self.lane.doubt == 1 {
             return Ok(());
@@ -288,7 +371,7 @@ impl Receivers {
             speeds.iter().all(|v| (0..=90 * 256).contains(v))
                 && (!is_measured(word) || signed(word, 44, 14).abs() <= 8191)
         };
-        let word = self.motion.accept(frame, in_range, 3)?;
+        let word = self.motion.accept(frame, now, in_range, 3)?;
         let speeds = [12, 28].map(|start| signed(word, start, 16) as f64 / 256.0);
         let speeds = self.followed(speeds).ok_or(Reject::Step)?;
         let braked = per_second(12.0, now - self.motion.at);

@@ -37,7 +37,7 @@ pub(crate) struct Rig {
     pub(crate) t_us: u64,
     pub(crate) clock_start_us: u32,
     pub(crate) ticks: u64,
-    counters: [u8; 4],
+    pub(crate) counters: [u8; 4],
     pub(crate) lane: LanePreview,
     pub(crate) speeds: [f64; 2],
     /// The measured yaw rate, if there is one.

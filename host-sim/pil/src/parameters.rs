@@ -26,11 +26,10 @@ const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 const STATUSES: usize = 5;
 /// The parameters in use come in turn, one every 100 ms, and a frame may be lost.
 const VALUES_WITHIN_ROUNDS: usize = 3;
-/// So many speeds of zero come first: the three of a new sender, and the hundred in a row of a vehicle that stands. In one piece:
-/// a pause of this computer between two would be a loss.
+/// So many speeds of zero come first: the three of a new sender, and the hundred in a row of a vehicle that stands.
 const SPEEDS: u8 = 110;
-/// Before each frame of a set: those that a sender has to show anew, and one more.
-const SPEEDS_BETWEEN: u8 = 4;
+/// Our frames come once in so many of the ECU's, which are a millisecond apart: faster ones are refused.
+const PERIOD: u32 = 10;
 /// So often is a set sent whose speeds were too old when it came.
 const ATTEMPTS: u32 = 10;
 
@@ -106,13 +105,21 @@ impl Product {
             standstill = Some(self.send_standstill()?);
         }
         for frame in [unlock].into_iter().chain(frames) {
-            // A slow line must not let the speed grow old on the way: three clean frames and the ECU trusts it again.
-            let mut together = Vec::new();
-            if let Some(counter) = &mut standstill {
-                together.extend((0..SPEEDS_BETWEEN).map(|_| standing(counter)));
-            }
-            together.push(*frame);
+            let speed = standstill.as_mut().map(standing);
+            let together: Vec<Frame> = speed.into_iter().chain([*frame]).collect();
             self.port.send(&together)?;
+            self.wait()?;
+        }
+        Ok(())
+    }
+
+    /// Lets a period pass, by the ECU's own frames.
+    fn wait(&mut self) -> Result<(), PilError> {
+        let until = Instant::now() + REPLY_TIMEOUT;
+        let mut left = PERIOD;
+        while left > 0 && Instant::now() < until {
+            let frame = self.port.frame()?;
+            left -= u32::from(frame.is_some_and(|frame| frame.id() == Guidance::ID));
         }
         Ok(())
     }
@@ -139,8 +146,10 @@ impl Product {
     /// Speeds of zero, for an ECU on a bench: nobody else sends any. Returns the counter of the next.
     fn send_standstill(&mut self) -> Result<u8, PilError> {
         let mut counter = 0;
-        let speeds: Vec<Frame> = (0..SPEEDS).map(|_| standing(&mut counter)).collect();
-        self.port.send(&speeds)?;
+        for _ in 0..SPEEDS {
+            self.port.send(&[standing(&mut counter)])?;
+            self.wait()?;
+        }
         Ok(counter)
     }
 
@@ -270,6 +279,7 @@ fn verdict(
         WriteOutcome::TooSoon => {
             "the ECU refused the set: it takes one ten seconds after a reset at the earliest; try again then"
         }
+        WriteOutcome::TooFast => "the ECU refused the set: its frames came in a burst, or are another's",
     }))
 }
 

@@ -210,12 +210,11 @@ fn parameters_can_be_tried() {
         torque_limit_nm: 3.0,
         ..Params::PAPER
     };
-    let send = |client: &mut Client, in_use: u32| {
-        for frame in [download::unlock(in_use, 77)]
-            .iter()
-            .chain(&download::frames(&params))
-        {
+    let send = |client: &mut Client, bench: &mut Bench, in_use: u32, speed: Speed, counter: &mut u8| {
+        let fields = download::frames(&params);
+        for frame in [download::unlock(in_use, 77)].iter().chain(&fields) {
             client.say(frame);
+            client.drive(bench, 10, speed, counter);
         }
     };
     let last = |heard: &[Frame]| *messages::<ParameterStatus>(heard).last().unwrap();
@@ -226,12 +225,12 @@ fn parameters_can_be_tried() {
     ] {
         // A jump from 5 m/s to nothing is held for 0.33 s, and a hundred messages say that it stands.
         client.drive(&mut bench, 2000, speed, &mut counter);
-        send(&mut client, in_use);
+        send(&mut client, &mut bench, in_use, speed, &mut counter);
         let heard = client.drive(&mut bench, 1100, speed, &mut counter);
         assert_eq!(last(&heard).outcome, outcome);
         assert!(!last(&heard).stored);
     }
-    send(&mut client, 0);
+    send(&mut client, &mut bench, 0, still, &mut counter);
     let heard = client.drive(&mut bench, 3500, still, &mut counter);
     assert_eq!((last(&heard).stored, last(&heard).sequence), (true, 1));
     assert_eq!(messages::<Identity>(&heard).last().unwrap().vehicle, 77);
@@ -245,7 +244,7 @@ fn parameters_can_be_tried() {
     };
     assert!(near(&values[restart..], &params), "{values:?}");
     // Every start takes a set after ten seconds at the earliest.
-    send(&mut client, 1);
+    send(&mut client, &mut bench, 1, still, &mut counter);
     let heard = client.drive(&mut bench, 1100, still, &mut counter);
     assert_eq!(last(&heard).outcome, WriteOutcome::TooSoon);
     bench.end().unwrap();

@@ -130,6 +130,8 @@ pub enum WriteOutcome {
     NotUnlocked = 7,
     /// Refused: the ECU has not run for ten seconds since a reset.
     TooSoon = 8,
+    /// Refused: its fields came faster than a client sends them.
+    TooFast = 9,
 }
 
 impl WriteOutcome {
@@ -146,6 +148,7 @@ impl WriteOutcome {
             6 => Self::NotStanding,
             7 => Self::NotUnlocked,
             8 => Self::TooSoon,
+            9 => Self::TooFast,
             _ => return None,
         })
     }
