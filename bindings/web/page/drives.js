@@ -8,12 +8,12 @@ const ramp = (length, from, to) => `{length_m = ${length}, curvature_start_per_m
 const bend = (length, curvature) => ramp(length, curvature, curvature);
 const inline = (name, segments) => `{name = "${name}", lane_width_m = 3.6, segment = [${segments.join(", ")}]}`;
 const round = (radius, arc, ease) => { const c = 1 / radius; return [ramp(ease, 0, c), bend(arc, c), ramp(ease, c, 0)]; };
-const COURSES = {
-  "paper-course": null,
-  bends: inline("bends", [bend(70, 0), ...round(300, 220, 80), bend(60, 0), ...round(-350, 240, 80), bend(60, 0), ...round(450, 300, 90),
-    bend(60, 0), ...round(-300, 220, 80), bend(300, 0)]),
-  winding: inline("winding", [bend(60, 0), ...[200, -250, 180, -220, 260, -180].flatMap(radius => [...round(radius, 70, 60), bend(20, 0)]), bend(200, 0)]),
-};
+const COURSES = new Map([
+  ["paper-course", null],
+  ["bends", inline("bends", [bend(70, 0), ...round(300, 220, 80), bend(60, 0), ...round(-350, 240, 80), bend(60, 0), ...round(450, 300, 90),
+    bend(60, 0), ...round(-300, 220, 80), bend(300, 0)])],
+  ["winding", inline("winding", [bend(60, 0), ...[200, -250, 180, -220, 260, -180].flatMap(radius => [...round(radius, 70, 60), bend(20, 0)]), bend(200, 0)])],
+]);
 const dropped = new Map();
 
 // The paper's drivers lie on this line: who relies on the guidance looks less at the road.
@@ -21,7 +21,7 @@ const onLine = k_hg => ({ k_hg, k_d: 2 + 2 * k_hg });
 
 function scenario(given, { person = false } = {}) {
   const s = { ...PLAIN, ...given };
-  const course = COURSES[s.course] ?? JSON.stringify(s.course);
+  const course = COURSES.get(s.course) ?? JSON.stringify(s.course);
   let text = `course = ${course}\nspeed_m_per_s = ${s.speed / 3.6}\ncondition = "${s.guided ? "mid" : "manual"}"\n`;
   if (!person) {
     text += `[driver]\nt_p_s = ${s.t_p}\nremnant_sd_nm = ${s.remnant}\n`;

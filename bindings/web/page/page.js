@@ -30,7 +30,14 @@ function soon() {
   setTimeout(() => { asked = false; render(); });
 }
 // A parser shows the whole line that it did not understand: its place and its reason are enough.
-function wrong(text) { $("wrong").textContent = text.split("\n").filter(line => !/^\s*\d*\s*\|/.test(line)).join(" ").slice(0, 400); }
+const reason = text => text.split("\n").filter(line => !/^\s*\d*\s*\|/.test(line)).join(" ").slice(0, 400);
+// What is wrong with what is shown: gone as soon as something else is.
+function wrong(text) { $("wrong").textContent = reason(text); }
+// What became of something that the reader brought, a link or a file: it stays until it is read.
+function notice(text) {
+  $("noticed").textContent = reason(text);
+  $("notice").hidden = text === "";
+}
 
 function go(step) {
   if (live.going && step !== "drive") live.end();
@@ -48,6 +55,8 @@ function instants(settings, { channels, failed_s }) {
     if (settings.fail === "input") marks.push({ x: settings.at, name: t("mark_input"), kind: "failure" });
     if (settings.fail && settings.fail !== "none") marks.push({ x: settings.at + 1, name: t("mark_notice"), kind: "mode" });
     for (let i = 1, from = 0; i < mode.length; i++) {
+      // A torque that is lost is gone, whatever mode the ECU takes afterwards.
+      if (lost !== null && time[i] > lost) break;
       const words = [];
       if (mode[i] !== mode[i - 1]) words.push(MODES[mode[i]] ?? mode[i]);
       if (warning[i] && !warning[i - 1]) words.push(t("mark_warning"));
@@ -114,7 +123,7 @@ function chosen(control, value) {
 }
 function options(control) {
   if (control.options === "laws") return [["shipping", t("shipping")], ...drives.names.map(name => [name, name]), ["own", t("own")]];
-  if (control.options === "courses") return [...Object.keys(COURSES).map(name => [name, t(name.replace("-", "_"))]), ...[...dropped.keys()].map(name => [name, name])];
+  if (control.options === "courses") return [...[...COURSES.keys()].map(name => [name, t(name.replace("-", "_"))]), ...[...dropped.keys()].map(name => [name, name])];
   if (control.key === "driver") return [["own", t("driver_own")], ...DELAYS.map((_, i) => [String(i + 1), t(`driver_${i + 1}`)]), ...lab.fourteen().map((_, i) => [String(i + 4), t("driver_of", { number: i + 1 })])];
   return control.options.map(([value, name]) => [value, /^[AB]$/.test(name) ? name : t(name)]);
 }

@@ -16,7 +16,7 @@ function drawLive() {
   live.asked = asked;
   resetLive();
   $("found").replaceChildren();
-  $("told").textContent = [live.note, t(COURSES[S.course] ? "drive_bend" : ""), t("drive_ready")].join(" ").trim();
+  $("told").textContent = [live.note, t(COURSES.get(S.course) ? "drive_bend" : ""), t("drive_ready")].join(" ").trim();
   live.note = "";
 }
 // The road before a start, so that there is something to see.
@@ -115,7 +115,7 @@ async function take(file) {
     live.end();
     [live.asked, live.note] = ["", t("road_took", { name, km: (length_m / 1000).toFixed(1) })];
     if (S.step === "compare") { S.a.course = S.b.course = name; soon(); } else say({ step: "drive", course: name });
-  } catch (error) { wrong(t("wrong_file", { name, what: error.message })); }
+  } catch (error) { notice(t("wrong_file", { name, what: error.message })); }
 }
 
 function listen() {
@@ -129,6 +129,7 @@ function listen() {
   $("play").addEventListener("click", () => { clock.playing = !clock.playing; });
   $("time").addEventListener("input", () => { clock.at = Number($("time").value); });
   $("start").addEventListener("click", () => startLive());
+  $("read").addEventListener("click", () => notice(""));
   $("road").addEventListener("change", event => { if (event.target.files[0]) take(event.target.files[0]); });
   for (const button of document.querySelectorAll("[data-share]")) button.addEventListener("click", () => share(button.dataset.share));
   addEventListener("dragover", event => event.preventDefault());
@@ -142,7 +143,7 @@ function arrive() {
   S = state;
   if ($("lawtext").value !== S.law) $("lawtext").value = S.law;
   render();
-  if (odd.length) wrong(t("wrong_link", { what: odd.join(", ") }));
+  notice(odd.length ? t("wrong_link", { what: odd.join(", ") }) : "");
 }
 
 async function begin() {

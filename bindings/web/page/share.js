@@ -1,31 +1,46 @@
 // What a reader takes along: the state in the address, pictures, series, a scenario file.
 
-const OWN_STATE = { step: "loop", t_p: 0.5, k_hg: 0.5, at: 70, who: 0.5, part: "", shown: "a", course: "bends", guided: "on", speed: 60, law: LAW };
-const LEAST = { a_1: [0, 0.5], a_2: [0, 0.1], a_3: [0, 8], t_p: [0.05, 0.8], k_hg: [0, 1], at: [2, 150], who: [0.1, 0.5], k_d: [1, 6], k_1: [0.05, 0.5], speed: [30, 110], remnant: [0, 0.3] };
+// What a text of an address may be, and the value that it means; `undefined` if it is none of these. The ends of numbers are those of the
+// scenario's fields (docs/files.md): a slider offers less, and a driver of the paper lies beyond some.
+const within = (least, most) => text => text.trim() !== "" && Number(text) >= least && Number(text) <= most ? Number(text) : undefined;
+const oneOf = (...values) => text => values.find(value => String(value) === text);
+const anyText = text => text;
+const listOf = (is, most) => text => {
+  const values = text === "" ? [] : text.split(" ").map(is);
+  return values.length <= most && !values.includes(undefined) ? values : undefined;
+};
+const GAIN = within(0, 50), SHARE = within(0, 10), INSTANT_S = within(0, 1e6), SPEED_KMH = within(5.5 * 3.6, 70 * 3.6);
+// Each field of the state with the value that it has at the start. They are maps, so that no word of the language is a field of them.
+const OF_PAGE = new Map([
+  ["step", ["loop", text => oneOf(...ORDER)(text)]],
+  ["t_p", [0.5, within(0.001, 2)]], ["k_hg", [0.5, SHARE]], ["at", [70, INSTANT_S]], ["who", [0.5, oneOf(...DELAYS)]], ["tried", [[], listOf(SHARE, 3)]],
+  ["part", ["", oneOf("", "road", "driver", "ecu", "wheel", "car", "felt")]], ["shown", ["a", oneOf("a", "b")]],
+  ["course", ["bends", anyText]], ["guided", ["on", oneOf("on", "off", "surprise")]], ["speed", [60, SPEED_KMH]], ["law", [LAW, anyText]],
+]);
+const DRIVERS = ["own", ...Array.from({ length: DELAYS.length + 14 }, (_, i) => String(i + 1))];
+const OF_DRIVE = new Map(Object.entries({
+  driver: oneOf(...DRIVERS), a_1: within(0, 10), a_2: within(0, 10), a_3: within(0, 100), t_p: within(0.001, 2), k_hg: SHARE, k_d: GAIN, speed: SPEED_KMH,
+  guided: oneOf(true, false), k_1: within(0, 4), law: anyText, fail: oneOf("none", "torque", "input"), at: INSTANT_S, probe: oneOf(true, false),
+  remnant: within(0, 5), course: anyText,
+}));
+const written = value => Array.isArray(value) ? value.join(" ") : String(value);
 
 function toAddress(state) {
   const said = new URLSearchParams();
-  for (const [key, plain] of Object.entries(OWN_STATE)) if (state[key] !== plain) said.set(key, state[key]);
+  for (const [key, [plain]] of OF_PAGE) if (written(state[key]) !== written(plain)) said.set(key, written(state[key]));
   for (const drive of ["a", "b"])
-    for (const [key, value] of Object.entries(state[drive])) if (value !== START[drive][key]) said.set(`${drive}.${key}`, value);
+    for (const key of OF_DRIVE.keys()) if (state[drive][key] !== START[drive][key]) said.set(`${drive}.${key}`, written(state[drive][key]));
   return `#${said}`;
 }
 
-// What of an address is understood; the rest by name.
+// The state of an address, and the names of what in it is not understood.
 function fromAddress(hash) {
-  const state = { ...OWN_STATE, a: { ...START.a }, b: { ...START.b }, tried: [] }, odd = [];
+  const state = { a: { ...START.a }, b: { ...START.b } }, odd = [];
+  for (const [key, [plain]] of OF_PAGE) state[key] = Array.isArray(plain) ? [...plain] : plain;
   for (const [name, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
-    const [drive, key] = name.includes(".") ? name.split(".") : [null, name];
-    const place = drive ? START[drive] && key in PLAIN ? state[drive] : null : key in OWN_STATE ? state : null;
-    const plain = drive ? PLAIN[key] : OWN_STATE[key];
-    let value = text;
-    if (typeof plain === "number") value = text.trim() === "" ? NaN : Number(text);
-    if (typeof plain === "boolean") value = { true: true, false: false }[text];
-    const [least, most] = LEAST[key] ?? [];
-    const good = place && value !== undefined && !(typeof value === "number" && !(value >= least && value <= most))
-      && !(key === "step" && !ORDER.includes(value)) && !(!drive && key === "who" && !DELAYS.includes(value)) && !(!drive && key === "guided" && !["on", "off", "surprise"].includes(value))
-      && !(key === "shown" && !["a", "b"].includes(value)) && !(key === "fail" && !["none", "torque", "input"].includes(value));
-    if (good) place[key] = value; else odd.push(name.slice(0, 30));
+    const [, drive, key] = /^(?:(a|b)\.)?(.*)$/s.exec(name);
+    const value = drive ? OF_DRIVE.get(key)?.(text) : OF_PAGE.get(key)?.[1](text);
+    if (value === undefined) odd.push(name.slice(0, 30)); else (drive ? state[drive] : state)[key] = value;
   }
   return { state, odd };
 }

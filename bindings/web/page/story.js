@@ -61,7 +61,10 @@ const STEPS = {
         error(`alone${t_p}`, t("alone"), "manual"), error(`now${t_p}`, t("now_line", { k_hg: s.k_hg.toFixed(2) }), "now")],
       { title: t("panel_driver", { who: t(WHO[t_p]), t_p: t_p.toFixed(1) }), least: 0.25, mine: t_p === s.who })),
       controls: [RESISTS, THREE],
-      says: r => t("said_reliance", { k_hg: s.k_hg.toFixed(2), now: f3(peak(r["now0.5"])), alone: f3(peak(r["alone0.5"])), effort: f3(effort(r["now0.5"])), alone_effort: f3(effort(r["alone0.5"])) }),
+      says: r => {
+        const [now, alone] = [r[`now${s.who}`], r[`alone${s.who}`]];
+        return t("said_reliance", { k_hg: s.k_hg.toFixed(2), who: t(WHO[s.who]), now: f3(peak(now)), alone: f3(peak(alone)), effort: f3(effort(now)), alone_effort: f3(effort(alone)) });
+      },
     };
   },
   failure: (s, say) => {

@@ -44,7 +44,7 @@ const STRINGS = { en: {
   said_loop: "In this bend the driver turns with {driver} N.m on average and the guidance with {guidance} N.m; the car stays within {peak} m of the middle.",
   said_guidance: "A driver who acts {t_p} s late leaves the middle by up to {alone} m alone and {guided} m with guidance: {less} m {word}.",
   less_word: "less", more_word: "more",
-  said_reliance: "With K_hg {k_hg} the slow driver leaves the middle by up to {now} m, without guidance by {alone} m, and turns with {effort} N.m on average instead of {alone_effort}.",
+  said_reliance: "With K_hg {k_hg} the {who} driver leaves the middle by up to {now} m, without guidance by {alone} m, and turns with {effort} N.m on average instead of {alone_effort}.",
   said_failure: "Torque lost at {at} s, driver {t_p} s late: who relies swings out to {high} m, who goes half along to {mid} m, who resists to {low} m; without a failure it was {none} m.",
   said_handover: "The same failure at {at} s: {sudden} m if the torque is gone at once, {handed} m with a handover, {none} m if nothing fails.",
   said_probe: "The ECU tells {told} plus or minus {deviation} (standard deviation); the truth is {truth}.", said_probe_none: "The ECU has told nothing yet.",
@@ -72,7 +72,7 @@ const STRINGS = { en: {
   found_interval: "{value} {unit}; with 95 % certainty between {low} and {high}.", found_not: "This drive does not tell it.", found_fourteen: "The paper's fourteen drivers: {low} to {high}, half of them below {median}.", found_fit: "A driver with these numbers explains {fit} % of your torque.",
   law_edit: "Your law in JavaScript", law_reset: "Start again from the shipping law", law_line: "Line {line}: {what}", law_at: "at {time} s", law_stopped: "(the drive stopped there; the last good one stays in the chart)", law_odd: "At {time} s your law returned {value}, which is no number: it was taken as 0 N.m, and the drive went on.", law_endless: "your law did not come back within 3 s: does it loop for ever?", law_good: "Your law is driven.",
   law_sees: "see has e_y (m, lane ahead to the left +), e_y_rate (m/s), e_theta (rad), e_theta_rate (rad/s), driver_torque (N.m), wheel (rad), wheel_rate (rad/s), speed (m/s), time (s) and k_hg (null until told).",
-  wrong_drive: "This cannot be driven: {what}", wrong_page: "The page cannot start: {what}", wrong_file: "{name} is no road: {what}", wrong_link: "A part of the link is not understood and was left out: {what}.",
+  notice_read: "Close", wrong_drive: "This cannot be driven: {what}", wrong_page: "The page cannot start: {what}", wrong_file: "{name} is no road: {what}", wrong_link: "A part of the link is not understood and was left out: {what}.",
 } };
 const language = Object.keys(STRINGS).find(known => known === navigator.language?.slice(0, 2)) ?? "en";
 const t = (key, values = {}) => (STRINGS[language][key] ?? STRINGS.en[key] ?? key).replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
