@@ -202,7 +202,6 @@ impl Monitor {
     /// Judges what is about to leave. `true` renews the permission for this millisecond; after the first
     /// `false` it is never renewed.
     #[must_use]
-    #[inline(always)]
     pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
@@ -298,7 +297,6 @@ impl Monitor {
         state.lane_state.rate_mnm = demanded(per_mps, e_y_mmps, per_radps, e_theta_urps);
     }
 
-    #[inline(always)]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
         if state.step.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
@@ -373,7 +371,6 @@ impl Monitor {
 
 impl MonitorState {
     /// Takes the frames that arrived. Returns whether there is a new lane sample to go by.
-    #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
         let mut is_newer = false;
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
@@ -433,7 +430,6 @@ impl MonitorState {
 }
 
 /// Whether a guidance frame says LaneTimeout or LaneStep.
-#[cold]
 fn says_aside(guidance: &[u8; 8]) -> bool {
     field(guidance, 37, 1) | field(guidance, 52, 1) != 0
 }
