@@ -673,6 +673,6 @@ fn times_are_those_of_the_clock_whatever_a_step_takes() {
         assert!((0..50).all(|_| asks(true)));
         let steps = (0..3000).take_while(|_| asks(false)).count() as u32;
         // While there is time left.
-        assert_eq!(steps, (1_030_000 - 1) / us + 20, "{us} us");
+        assert_eq!(steps, (1_075_000 - 1) / us + 20, "{us} us");
     }
 }

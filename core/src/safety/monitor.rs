@@ -148,8 +148,9 @@ const TOLERANCE_MNM: i32 = 3;
 /// How many times as fast a torque may fall in a handover. The lane may be implausible then, which the monitor does
 /// not know.
 const DISTRUSTED: i32 = 4;
-/// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 30 ms.
-const PROBE_END_US: i32 = 1_030_000;
+/// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 75 ms, three periods of the slowest
+/// host.
+const PROBE_END_US: i32 = 1_075_000;
 /// How many steps the torque may be outside its band.
 pub const ASTRAY_MS: i32 = 20;
 /// In Active no torque may follow from lane data older than this: the age of a sample on arrival, and three periods
