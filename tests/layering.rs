@@ -16,11 +16,12 @@ type Arrows = &'static [(&'static str, &'static [&'static str])];
 const CORE: Arrows = &[
     // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
     ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
-    ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
+    ("controller", &["controller::config", "controller::injection", "controller::inputs", "quantity", "safety::envelope", "safety::faults", "safety::modes", "safety::redundant"]),
     ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("controller::injection", &["quantity"]),
     ("controller::inputs", &["lane", "quantity", "safety::faults", "safety::redundant"]),
-    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "lane", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp"]),
+    ("controller::memory", &["law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
+    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "controller::memory", "lane", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::plausibility", "safety::ramp"]),
     ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "lane", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("estimator", &["bus", "law::sine", "quantity"]),
     // The input that bus, law and checks share.
@@ -391,8 +392,6 @@ const LONGER: &[(&str, &str)] = &[
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
     ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
-    ("core/src/controller/mod.rs", "what the controller reads, decides and remembers, beside each other"),
-    ("core/src/controller/step.rs", "one step of the controller, read from top to bottom"),
     ("core/src/ecu/receivers.rs", "what each message has to pass before it is used, beside the others"),
     ("core/src/safety/plausibility.rs", "the checks, with the sums that they keep"),
     ("core/src/safety/monitor.rs", "the second computation, which stands by itself"),

@@ -12,7 +12,7 @@
 //!
 //! ```text
 //! frame            bus            length, CRC, counter, range          -> rejected, the last good one stays
-//!   -> inputs      ecu            possible step, age                   -> lost after 30 ms
+//!   -> inputs      ecu            possible step, age                   -> lost after three periods
 //!   -> checks      plausibility   can the inputs be true together?     -> Handover
 //!   -> mode        modes          Boot, Standby, Active, Fade, Handover, Fault, Locked
 //!   -> law (9)     law, probe     what the lane asks for               or ramp: the way to zero

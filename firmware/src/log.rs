@@ -21,16 +21,19 @@ static ENCODER: Shared = Shared(UnsafeCell::new(defmt::Encoder::new()));
 // SAFETY: as for `Shared`; each encoder borrow ends with its function.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
+        // SAFETY: nobody else has the encoder: messages do not come between one another.
         unsafe { &mut *ENCODER.0.get() }.start_frame(ThisBoard::log);
     }
 
     unsafe fn flush() {}
 
     unsafe fn release() {
+        // SAFETY: as in `acquire`.
         unsafe { &mut *ENCODER.0.get() }.end_frame(ThisBoard::log);
     }
 
     unsafe fn write(bytes: &[u8]) {
+        // SAFETY: as in `acquire`.
         unsafe { &mut *ENCODER.0.get() }.write(bytes, ThisBoard::log);
     }
 }

@@ -231,10 +231,10 @@ impl Ecu {
             guidance: guidance.bytes(),
             elapsed_us,
         };
-        let v = self.memory.value_mut();
-        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
+        let memory = self.memory.value_mut();
+        let permitted = permits(monitor, &mut memory.monitor, &evidence, injection);
         faults.insert_if(!permitted, Fault::Monitor);
-        v.step = LastStep {
+        memory.step = LastStep {
             applied: if permitted { command.torque } else { Torque::ZERO },
             faults: faults.bits(),
             at: now,
@@ -361,10 +361,10 @@ impl Ecu {
 #[inline(never)]
 fn seal(memory: &mut Redundant<Memory>, is_new_picture: bool) {
     let memory = black_box(memory);
-    memory.seal_part(|v| &mut v.step);
-    memory.seal_part(|v| &mut v.monitor.step);
+    memory.seal_part(|memory| &mut memory.step);
+    memory.seal_part(|memory| &mut memory.monitor.step);
     if is_new_picture {
-        memory.seal_part(|v| &mut v.monitor.lane_state);
+        memory.seal_part(|memory| &mut memory.monitor.lane_state);
     }
 }
 

@@ -218,7 +218,6 @@ impl LawState {
     }
 
     /// The errors continued at their rates: at most 128 and half of what a rate may be.
-    #[inline(always)]
     fn continued(&self, age: Micros) -> [I12F20; 2] {
         let now = |error: I8F24, rate: I12F20| {
             let rounded = I12F20::wrapping_from_num(error.saturating_add(HALF));
@@ -278,25 +277,17 @@ impl Coefficients {
         (state.has_last, state.last) = (1, sample);
     }
 
-    /// The torque now, from the sample taken last.
-    #[inline(always)]
+    /// The torque now, from the sample taken last; with the vehicle's motion since where the sample was old when it arrived.
     pub(crate) fn demanded(&self, state: &LawState, now: Instant, ego: Option<&EgoMotion>) -> Torque {
         let age = now.since(state.last.at);
         match ego {
             None => self.torque(state, age),
-            Some(ego) => self.demanded_from_old_sample(state, age, ego),
+            Some(ego) => self.torque(&state.moved_with(age, ego), age),
         }
-    }
-
-    /// The same from a sample that was old when it arrived. Not inlined, so that the usual case stays short.
-    #[inline(never)]
-    fn demanded_from_old_sample(&self, state: &LawState, age: Micros, ego: &EgoMotion) -> Torque {
-        self.torque(&state.moved_with(age, ego), age)
     }
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two
     /// `i32` times 10^6 times 2^4 gives 2^57 too: the sum cannot overflow.
-    #[inline(always)]
     fn filter(&self, rate: I12F20, from: I8F24, to: I8F24, dt: Micros) -> I12F20 {
         const MOST: u32 = MAX_RATE << I12F20::FRAC_NBITS;
         let tau = i64::from(self.tau);

@@ -72,21 +72,21 @@ macro_rules! faults {
 }
 
 faults! {
-    /// B: no usable lane preview for 30 ms, or for 1 s more of guidance.
+    /// B: no usable lane preview for three periods of the camera, or for 1 s more of guidance.
     0 LaneTimeout: B, 0;
     /// B: the camera marks its preview as not valid.
     1 LaneInvalid: B, 0;
     /// B: the lateral error does not move as yaw error, wheel and speed say it must.
     2 LaneImplausible: B, 10_000;
-    /// B: no usable driver torque and wheel angle for 30 ms.
+    /// B: no usable driver torque and wheel angle for three periods of the sender.
     3 ColumnTimeout: B, 0;
     /// B: driver torque and wheel angle do not belong together.
     4 ColumnImplausible: B, 1500;
-    /// B: no usable speed for 30 ms.
+    /// B: no usable speed for three periods of the sender.
     5 SpeedTimeout: B, 0;
     /// B: the two speeds differ by 2 m/s or more.
     6 SpeedImplausible: B, 800;
-    /// B: no usable request for 30 ms.
+    /// B: no usable request for three periods of the sender.
     7 RequestTimeout: B, 0;
     /// C: steps late or missing.
     8 Deadline: C, 0;
@@ -102,9 +102,9 @@ faults! {
     13 Parameters: Locked, 0;
     /// Locked: three resets within 10 s, or ten since power-up.
     14 ResetLoop: Locked, 0;
-    /// B: lane previews arrive, and for 30 ms, or 4 s of guidance, each is too far from the last one used to be true.
+    /// B: lane previews arrive, and for three periods, or 4 s of guidance, each is too far from the last one used to be true.
     15 LaneStep: B, 0;
-    /// B: speeds arrive, and for 30 ms each is too far from the last one used to be true.
+    /// B: speeds arrive, and for 0.3 s and three periods each is too far from the last one used to be true.
     16 SpeedStep: B, 0;
     /// B: another node sends under an identifier of this ECU; for a second after the last such frame.
     17 OwnIdentifier: B, 0;

@@ -48,8 +48,12 @@ words! {
     pub(crate) struct StepState {
         torque_mnm: i32,
         driver_mnm: i32,
-        /// Time since the lane sample was taken.
+        /// Time since the lane sample in use was taken.
         age_us: i32,
+        /// Time since a picture came, in use or not.
+        unheard_us: i32,
+        /// For how long pictures may still be left aside.
+        aside_us: i32,
         /// How long the torque may still contain the probe.
         probe_left_us: i32,
         /// Number of steps in which the torque was outside its band and not falling, since it was last inside.
@@ -60,11 +64,12 @@ words! {
 }
 
 words! {
-    /// The part that a new lane sample changes.
+    /// The part that a new picture changes.
     pub(crate) struct LaneState {
         lane: Lane,
-        /// Its age when it arrived.
-        came_us: i32,
+        /// How far apart the last two pictures came, and the longest such time of a camera that sends, lately.
+        apart_us: i32,
+        period_us: i32,
         /// An older lane sample, from which the rates are computed, and how much older it is.
         before: Lane,
         older_us: i32,
@@ -143,8 +148,9 @@ const TOLERANCE_MNM: i32 = 3;
 /// How many times as fast a torque may fall in a handover. The lane may be implausible then, which the monitor does
 /// not know.
 const DISTRUSTED: i32 = 4;
-/// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 30 ms.
-const PROBE_END_US: i32 = 1_030_000;
+/// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 75 ms, three periods of the slowest
+/// host.
+const PROBE_END_US: i32 = 1_075_000;
 /// How many steps the torque may be outside its band.
 pub const ASTRAY_MS: i32 = 20;
 /// In Active no torque may follow from lane data older than this: the age of a sample on arrival, and three periods
@@ -153,10 +159,14 @@ const OLDEST_LANE_US: i32 = 360_000;
 /// How much longer the lane may be extrapolated: a second without a picture, and 0.3 s in which the torque falls
 /// where pictures then show another line. The band is wider by 1 mN.m for each millisecond since the last picture.
 const COAST_US: i32 = 1_400_000;
-/// A picture may be ignored, as one of another line, only after this time without a picture, which is shorter than
-/// any time-out. So a guidance frame that claims another line is not trusted while a camera of 40 Hz or more sends
-/// pictures.
-const UNSEEN_US: i32 = 25_000;
+/// A camera is silent after this time without a picture, and after two and a half of its periods: both are shorter than any time-out
+/// of the controller, which waits for three periods and 30 ms. One lost picture is no silence.
+const SILENT_US: i32 = 25_000;
+/// The period of the slowest camera that is waited for, 15 Hz. A shorter one is forgotten within 64 pictures.
+const LONGEST_PERIOD_US: i32 = 66_667;
+/// Behind a silence pictures may show another line, and be left aside for so long: after 0.5 s an honest controller has let go of the
+/// old line, and has no torque.
+const ASIDE_US: i32 = 600_000;
 /// A sample older than this is continued with its rates, for at most the second time.
 const PROMPT_LANE_US: i32 = 40_000;
 const LONGEST_LATE_US: i32 = OLDEST_LANE_US - PROMPT_LANE_US;
@@ -177,6 +187,8 @@ impl MonitorState {
             torque_mnm: 0,
             driver_mnm: 0,
             age_us: 0,
+            unheard_us: 0,
+            aside_us: 0,
             probe_left_us: 0,
             astray_ms: 0,
             withdrawn: 0,
@@ -186,7 +198,8 @@ impl MonitorState {
                 e_y_mm: 0,
                 e_theta_urad: 0,
             },
-            came_us: 0,
+            apart_us: 0,
+            period_us: 0,
             before: Lane {
                 e_y_mm: 0,
                 e_theta_urad: 0,
@@ -202,7 +215,6 @@ impl Monitor {
     /// Judges what is about to leave. `true` renews the permission for this millisecond; after the first
     /// `false` it is never renewed.
     #[must_use]
-    #[inline(always)]
     pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
@@ -298,7 +310,6 @@ impl Monitor {
         state.lane_state.rate_mnm = demanded(per_mps, e_y_mmps, per_radps, e_theta_urps);
     }
 
-    #[inline(always)]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
         if state.step.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
@@ -373,13 +384,14 @@ impl Monitor {
 
 impl MonitorState {
     /// Takes the frames that arrived. Returns whether there is a new lane sample to go by.
-    #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
-        let mut is_newer = false;
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
-        let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
+        self.step.unheard_us = self.step.unheard_us.saturating_add(elapsed_us);
+        self.step.aside_us = self.step.aside_us.saturating_sub(elapsed_us).max(0);
         let frames = evidence.frames;
-        if frames.new.lane && (unseen_us <= UNSEEN_US || !says_aside(evidence.guidance)) {
+        let may_be_aside = frames.new.lane && self.may_leave_aside();
+        let is_newer = frames.new.lane && !(may_be_aside && says_aside(evidence.guidance));
+        if is_newer {
             let bytes = &frames.lane;
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
@@ -389,7 +401,6 @@ impl MonitorState {
                 .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
                 .saturating_mul(100);
             let apart_us = self.step.age_us.saturating_sub(age_us);
-            is_newer = true;
             // After a gap there is no rate.
             if self.step.age_us > OLDEST_LANE_US {
                 (self.lane_state.before, self.lane_state.older_us) = (new, 0);
@@ -398,7 +409,9 @@ impl MonitorState {
             } else {
                 self.lane_state.older_us = self.lane_state.older_us.saturating_add(apart_us);
             }
-            (self.lane_state.lane, self.lane_state.came_us, self.step.age_us) = (new, age_us, age_us);
+            (self.lane_state.lane, self.step.age_us) = (new, age_us);
+            // The line is found: the next picture counts, whatever is said of it.
+            self.step.aside_us = 0;
         }
         if frames.new.column {
             self.step.driver_mnm = field(&frames.column, 12, 18).saturating_mul(1000) / 4096;
@@ -408,6 +421,28 @@ impl MonitorState {
             self.step.probe_left_us = PROBE_END_US;
         }
         is_newer
+    }
+
+    /// Takes note of a picture that came, and says whether it may be left aside, as one of another line. A guidance frame that claims one
+    /// is trusted behind a silence of the camera alone, which the monitor measures itself. A camera that has become slower is no
+    /// silent one: its second picture comes after as long as its first.
+    fn may_leave_aside(&mut self) -> bool {
+        let apart_us = self.step.unheard_us;
+        let before_us = self.lane_state.apart_us;
+        let period_us = self.lane_state.period_us;
+        let is_silence = apart_us > SILENT_US
+            && apart_us > period_us.saturating_mul(5) / 2
+            && apart_us > before_us.saturating_mul(3) / 2;
+        if is_silence {
+            self.step.aside_us = ASIDE_US;
+        } else if apart_us > period_us {
+            self.lane_state.period_us = apart_us.min(LONGEST_PERIOD_US);
+        } else {
+            let shorter = period_us.saturating_sub(apart_us) / 64;
+            self.lane_state.period_us = period_us.saturating_sub(shorter);
+        }
+        (self.step.unheard_us, self.lane_state.apart_us) = (0, apart_us);
+        self.step.aside_us > 0
     }
 
     /// How fast the lane errors move, mm/s and urad/s.
@@ -433,7 +468,6 @@ impl MonitorState {
 }
 
 /// Whether a guidance frame says LaneTimeout or LaneStep.
-#[cold]
 fn says_aside(guidance: &[u8; 8]) -> bool {
     field(guidance, 37, 1) | field(guidance, 52, 1) != 0
 }

@@ -95,6 +95,16 @@ struct Law {
     rates: [f64; 2],
 }
 
+/// What driver activity has felt since guidance began.
+#[derive(Debug, Clone, Copy, Default)]
+struct Activity {
+    /// The wheel's angle when it came last, and when that was.
+    last: Option<(f64, i64)>,
+    rate: f64,
+    agreement: f64,
+    size: f64,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Ramp {
     from: f64,
@@ -161,6 +171,7 @@ pub(crate) struct Reference {
     /// When lane, column, motion and request were new.
     times: [i64; 4],
     law: Law,
+    activity: Activity,
     turned: f64,
     rate_then: f64,
     probe: [u32; 2],
@@ -205,6 +216,7 @@ impl Reference {
             kept: FaultSet::NONE,
             times: [now; 4],
             law: Law::default(),
+            activity: Activity::default(),
             turned: 0.0,
             rate_then: 0.0,
             probe: [0; 2],
@@ -462,6 +474,7 @@ impl Reference {
         match self.mode {
             Mode::Active => {
                 (self.law, self.anchor) = (Law::default(), (0.0, now));
+                self.activity = Activity::default();
                 self.hand.1 = 0;
             }
             Mode::Fade => {

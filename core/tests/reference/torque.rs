@@ -147,6 +147,7 @@ impl Reference {
             }
             self.demanded(now, &sample)
         });
+        let left = self.left_by_driver(now, seen, demanded);
         let demanded = if self.coast.sight == Sight::Sees {
             demanded
         } else {
@@ -158,7 +159,36 @@ impl Reference {
             .request
             .value()
             .map_or(1.0, |Request { authority, .. }| authority);
-        demanded * authority * self.share * self.coast.trust
+        demanded * authority * self.share * self.coast.trust * left
+    }
+
+    /// The share of (9) that driver activity leaves, by docs/reference/laws-and-drivers.md; all of it with the paper's law.
+    fn left_by_driver(&mut self, now: i64, seen: &Seen, asked: f64) -> f64 {
+        let p = &self.c.params;
+        if p.law == 0.0 {
+            return 1.0;
+        }
+        let activity = &mut self.activity;
+        if let Input::New(column) = seen.column {
+            let tau = 1.0 / (std::f64::consts::TAU * p.rate_corner_hz);
+            let passed = activity
+                .last
+                .map_or(0.1, |(_, at)| (now - at) as f64 * 1e-6)
+                .min(0.1);
+            activity.rate = match activity.last {
+                Some((last, _)) if passed < 0.1 => {
+                    (tau * activity.rate + column.wheel - last) / (tau + passed)
+                }
+                _ => 0.0,
+            };
+            activity.last = Some((column.wheel, now));
+            let power = column.driver * asked * activity.rate.powi(2).min(64.0);
+            activity.size += passed * (power.abs() - activity.size);
+            let agreement = activity.agreement + passed / 0.5 * (power - activity.agreement);
+            activity.agreement = agreement.clamp(-activity.size, activity.size);
+        }
+        let against = (-activity.agreement / (activity.size + 0.5_f64.powi(20))).max(0.0);
+        1.0 - (1.0 - p.activity_lambda_min) * against
     }
 
     fn take_sample(&mut self, sample: Lane) {
