@@ -18,8 +18,8 @@ use crate::boards::Board;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
-    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, profiles, python, trace,
-    venv, web, wheel,
+    bench, bindings_agree, boards, by_hand, c_library, coverage, fmu, gate, logs, mutants, profiles, python,
+    trace, venv, web, wheel,
 };
 
 /// Which stages run.
@@ -96,9 +96,9 @@ const STAGES: &[Stage] = stages! {
     "page-shipped" Full "the page as it is handed on": || web::check(Built::ToShip);
     "same-bits" Full "an evaluation in every profile: the same bytes": profiles::check;
     "instructions" Full "instructions of a step on the host, against xtask/golden.json": || bench::run(false);
-    "coverage" Full "every line and branch of core": evidence::coverage;
-    "defects-by-hand" Full "defects made by hand in core: each is noticed": by_hand::run;
-    "mutants" Full "a defect in every expression of core: each is noticed": || evidence::mutants(&[], None);
+    "coverage" Full "every line and branch of core": coverage::check;
+    "defects-by-hand" Full "defects made by hand in core: each is noticed": || by_hand::run(&[], None);
+    "mutants" Full "a defect in every expression of core: each is noticed": || mutants::check(&[], None);
     "fuzz" Full "a million inputs for every reader, a thousand million bytes for the ECU": fuzz;
     "campaign" Full "every fault, 500 seeds, in the paper's world and four real ones": campaign;
     "sanitised" Full "core, log and C library with AddressSanitizer": sanitised;
