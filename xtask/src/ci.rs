@@ -18,8 +18,8 @@ use crate::boards::Board;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
-    bench, bindings_agree, boards, by_hand, c_library, coverage, fmu, gate, logs, mutants, profiles, python,
-    trace, venv, web, wheel,
+    bench, bindings_agree, boards, by_hand, c_library, coverage, evidence, fmu, gate, logs, mutants,
+    profiles, python, trace, venv, web, wheel,
 };
 
 /// Which stages run.
@@ -86,7 +86,9 @@ const STAGES: &[Stage] = stages! {
     "c" Beside "the C library and its header, on the host and in QEMU": || c_library::check(Built::ForTests);
     "bindings-agree" Beside "the same frames from every binding": || bindings_agree::check(Built::ForTests);
     "requirements" Beside "every requirement has its evidence": || trace::run(false);
+    "evidence" Beside "the documents' tables of figures are those that were measured": evidence::check;
     "xtask" Beside "tests of xtask itself": xtask_tests;
+    "evidence-stale" Full "no figure is older than the code that it judges": evidence::stale;
     "all-boards" Full "the same of all boards, the real ones' images among them":
         || boards::check(boards::Scope::All, Built::ForTests, false);
     "wheel" Full "the wheel as it is handed on, installed and tested":

@@ -12,6 +12,7 @@ mod callgrind;
 mod ci;
 mod code;
 mod coverage;
+mod evidence;
 mod fmu;
 mod gate;
 mod golden;
@@ -66,6 +67,9 @@ enum Command {
     },
     /// Line, region and branch coverage of the core by its tests: all lines and branches, or exit code 1.
     Coverage,
+    /// Figures that documents show (docs/evidence.toml): measures those that are named, keeps them in docs/evidence/ with
+    /// their commit, seeds and rule, and writes the tables. Without a name: lists them.
+    Evidence(evidence::Options),
     /// A defect in every expression of the core (needs cargo-mutants; an hour or more). One that no test notices is
     /// printed, and is exit code 1; what cannot be noticed is listed in .cargo/mutants.toml with its reason.
     Mutants {
@@ -160,6 +164,7 @@ fn main() -> ExitCode {
         Command::Ci(options) => ci::check(&options),
         Command::Gate => gate::run(),
         Command::Coverage => coverage::check(),
+        Command::Evidence(options) => evidence::run(&options),
         Command::Mutants {
             files,
             in_diff,
