@@ -89,6 +89,10 @@ pub struct CaseResult {
     pub noticed_interval: [f64; 2],
     /// From the onset until then, ms: the median of those runs, and what 95 % of them keep.
     pub noticed_after_ms: [Option<u32>; 2],
+    /// Largest deviation of the runs in which it noticed nothing, m.
+    pub unnoticed_deviation_m: Option<f64>,
+    /// Largest torque of these runs, N.m.
+    pub unnoticed_torque_nm: Option<f64>,
     /// Runs in which the ECU left: a handover, a fade, a latched fault.
     pub left: u64,
     /// From the onset until it left, ms: the median of those runs and the longest.
@@ -246,6 +250,8 @@ pub(super) fn result(
         noticed: noticed_after_ms.len() as u64,
         noticed_interval: share(noticed_after_ms.len()),
         noticed_after_ms: [50, 95].map(|percent| quantile(&noticed_after_ms, percent)),
+        unnoticed_deviation_m: most(|o| unnoticed(o).map(|o| o.deviation.faulted_m)),
+        unnoticed_torque_nm: most(|o| unnoticed(o).map(|o| o.peak_nm)),
         left: left_after_ms.len() as u64,
         left_after_ms: left_after_ms
             .last()
@@ -264,6 +270,11 @@ pub(super) fn result(
         off_road: count(&|o| o.deviation.is_off_road()),
         failures: failures.collect(),
     }
+}
+
+/// A run in which the ECU noticed nothing.
+fn unnoticed(outcome: &TrialOutcome) -> Option<&TrialOutcome> {
+    outcome.noticed_after_ms.is_none().then_some(outcome)
 }
 
 /// What so many percent of sorted values do not exceed; `None` of nothing.
@@ -292,3 +303,6 @@ fn too_far(row: &FaultCase, deviation: &Deviation) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests;

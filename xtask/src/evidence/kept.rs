@@ -79,6 +79,8 @@ pub(super) struct Row {
     pub(super) noticed: u64,
     pub(super) noticed_interval: [f64; 2],
     pub(super) noticed_after_ms: [Option<u32>; 2],
+    pub(super) unnoticed_deviation_m: Option<f64>,
+    pub(super) unnoticed_torque_nm: Option<f64>,
     pub(super) left: u64,
     pub(super) left_after_ms: Option<[u32; 2]>,
     pub(super) deviation_m: f64,
@@ -166,7 +168,13 @@ impl Row {
         let thousandths = |value: &mut f64| *value = (*value * 1000.0).round() / 1000.0;
         let [low, high] = &mut self.noticed_interval;
         let own = [low, high, &mut self.deviation_m, &mut self.peak_torque_nm];
-        let others = [&mut self.excess_m, &mut self.pushed_m].into_iter().flatten();
+        let others = [
+            &mut self.excess_m,
+            &mut self.pushed_m,
+            &mut self.unnoticed_deviation_m,
+            &mut self.unnoticed_torque_nm,
+        ];
+        let others = others.into_iter().flatten();
         own.into_iter().chain(others).for_each(thousandths);
     }
 }

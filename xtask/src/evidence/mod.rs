@@ -19,7 +19,7 @@ use clap::Args;
 
 use crate::tool::{self, Usage};
 use kept::Kept;
-use list::List;
+use list::{List, Seeds};
 use stale::State;
 
 /// The list.
@@ -33,23 +33,26 @@ pub(crate) struct Options {
     /// Measurements to make, by name. One that is interrupted leaves everything as it was, and goes on from its parts
     #[arg(value_name = "NAME")]
     names: Vec<String>,
+    /// Every measurement that is stale or missing, those with held-out seeds last
+    #[arg(long, conflicts_with = "names")]
+    all: bool,
     /// Seeds in place of the rule's; the documents say both
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000), requires = "names")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: Option<u64>,
     /// Hours on each road in place of the rule's; the documents say both
-    #[arg(long, value_name = "H", requires = "names")]
+    #[arg(long, value_name = "H")]
     hours: Option<f64>,
     /// Why held-out seeds are used once more: with other code, or more or fewer of them. The documents say it
-    #[arg(long, value_name = "WHY", requires = "names")]
+    #[arg(long, value_name = "WHY")]
     again: Option<String>,
     /// List the measurements that are older than the code that they judge, or missing: exit code 1 if there is one
-    #[arg(long, conflicts_with_all = ["names", "check", "write"])]
+    #[arg(long, conflicts_with_all = ["names", "all", "check", "write"])]
     stale: bool,
     /// Exit code 1 if a table in a document is not what was measured
-    #[arg(long, conflicts_with_all = ["names", "write"])]
+    #[arg(long, conflicts_with_all = ["names", "all", "write"])]
     check: bool,
     /// Write every table anew from what is kept, and measure nothing
-    #[arg(long, conflicts_with = "names")]
+    #[arg(long, conflicts_with_all = ["names", "all"])]
     write: bool,
 }
 
@@ -65,7 +68,19 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     if options.write {
         return document::write(&list, &all_kept(&list)?);
     }
+    let asked = measure::Asked {
+        seeds: options.seeds,
+        hours: options.hours,
+        again: options.again.as_deref(),
+    };
+    if options.all {
+        return measure::all(&list, &stale_or_missing(&list)?, &asked);
+    }
     if options.names.is_empty() {
+        if options.seeds.is_some() || options.hours.is_some() || options.again.is_some() {
+            let message = "--seeds, --hours and --again are of a measurement: NAME, or --all";
+            return Err(Usage(message.into()).into());
+        }
         return print(&list, |_| true);
     }
     for name in &options.names {
@@ -74,11 +89,6 @@ pub(crate) fn run(options: &Options) -> Result<()> {
             return Err(Usage(format!("{name}: {LIST} has {}", names.join(", "))).into());
         }
     }
-    let asked = measure::Asked {
-        seeds: options.seeds,
-        hours: options.hours,
-        again: options.again.as_deref(),
-    };
     measure::all(&list, &options.names, &asked)
 }
 
@@ -102,20 +112,27 @@ pub(crate) fn check() -> Result<()> {
 pub(crate) fn stale() -> Result<()> {
     let list = List::read()?;
     print(&list, |state| !state.is_fresh())?;
-    let kept = all_kept(&list)?;
-    let states = list
-        .measurement
-        .iter()
-        .map(|(name, m)| stale::state(m, kept.get(name)));
-    let states = states.collect::<Result<Vec<_>>>()?;
-    let old = states.iter().filter(|state| !state.is_fresh()).count();
+    let old = stale_or_missing(&list)?.len();
+    let all = list.measurement.len();
     ensure!(
         old == 0,
-        "{old} of {} measurements are stale or missing",
-        states.len()
+        "{old} of {all} measurements are stale or missing: cargo xtask evidence --all"
     );
     println!("no figure is older than the code that it judges");
     Ok(())
+}
+
+/// Names of measurements to make, those that use up held-out seeds last.
+fn stale_or_missing(list: &List) -> Result<Vec<String>> {
+    let kept = all_kept(list)?;
+    let mut old = Vec::new();
+    for (name, measurement) in &list.measurement {
+        if !stale::state(measurement, kept.get(name))?.is_fresh() {
+            old.push((measurement.seeds == Seeds::HeldOut, name.clone()));
+        }
+    }
+    old.sort();
+    Ok(old.into_iter().map(|(_, name)| name).collect())
 }
 
 /// A line for each measurement whose state is to be shown.

@@ -33,13 +33,11 @@ judges = "all"
 
 /// A line of a row; what the arguments name differs from row to row.
 fn row(name: &str, class: &str, may_leave: bool, noticed: u64, more: &str) -> String {
-    let values = format!(
-        r#""runs":20,"is_limited":true,"worst_reaction_ms":281,"peak_torque_nm":1.25,"noticed_interval":[0.026,0.31],
-        "noticed_after_ms":[1470,null],"left":2,"left_after_ms":[1610,1700],"deviation_m":0.374,"excess_m":0.05,"pushed_m":null,
-        "beyond_drop":1,"beyond_limit":0,"left_lane":3,"leaves_too_often":false,"failed":1,
-        "failures":[{{"seed":75,"what":"late"}}]"#
-    );
-    let mut row: serde_json::Value = serde_json::from_str(&format!("{{{values}}}")).unwrap();
+    let values = r#"{"runs":20,"is_limited":true,"worst_reaction_ms":281,"peak_torque_nm":1.25,"noticed_interval":[0.026,0.31],
+        "noticed_after_ms":[1470,null],"unnoticed_deviation_m":0.31,"unnoticed_torque_nm":1.11,"left":2,
+        "left_after_ms":[1610,1700],"deviation_m":0.374,"excess_m":0.05,"pushed_m":null,"beyond_drop":1,"beyond_limit":0,
+        "left_lane":3,"leaves_too_often":false,"failed":1,"failures":[{"seed":75,"what":"late"}]}"#;
+    let mut row: serde_json::Value = serde_json::from_str(values).unwrap();
     row["name"] = name.into();
     row["class"] = class.into();
     row["may_leave"] = may_leave.into();
@@ -89,7 +87,7 @@ fn rows() -> Vec<String> {
             "L",
             false,
             0,
-            r#"{"noticed_after_ms":[null,null],"failed":2,"deviation_m":0.912,"peak_torque_nm":2.66,"left":0,"left_after_ms":null}"#,
+            r#"{"noticed_after_ms":[null,null],"failed":2,"deviation_m":0.912,"unnoticed_deviation_m":0.908,"unnoticed_torque_nm":2.66,"left":0,"left_after_ms":null}"#,
         ),
         row("law-random", "C", true, 20, r#"{"pushed_m":0.172}"#),
         row("tick-late", "C", true, 20, r#"{"pushed_m":0.03}"#),
@@ -135,11 +133,12 @@ fn goals_name_the_row_that_is_worst() {
     for wanted in [
         "| SG1: pushed the furthest, where the motor obeys | 0.17 m (`law-random`) | not measured |",
         "| SG1: pushed the furthest, where it does not | 0.40 m (`motor-ignores`) | not measured |",
-        "| SG2: deviated the furthest, in rows that may stay unnoticed | 0.91 m (`drifting`) | not measured |",
+        "| SG2: deviated the furthest, unnoticed | 0.91 m (`drifting`) | not measured |",
         // 2 rows of 3 in 20; and 2 rows of class B.
-        "| SG2: left the lane, in these rows | 6 of 40 | not measured |",
+        "| SG2: left the lane, in rows that may stay unnoticed | 6 of 40 | not measured |",
         "| SG3: left the lane, in rows of classes A and B | 6 of 40 | not measured |",
-        "| SG4: the largest torque, in rows that may stay unnoticed | 2.66 N.m (`drifting`) | not measured |",
+        "| SG4: the largest torque, unnoticed | 2.66 N.m (`drifting`) | not measured |",
+        "| SG4: the largest torque, in any row | 1.25 N.m (`bank`) | not measured |",
     ] {
         assert!(lines.iter().any(|line| line == wanted), "{wanted}\n{lines:#?}");
     }
