@@ -1,5 +1,6 @@
 //! Making a measurement: host-sim's commands, in parts that an interruption leaves behind.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -115,40 +116,63 @@ fn parts_in(name: &str, commit: &str, count: Rule) -> PathBuf {
 /// Earlier uses of the seeds of a measurement.
 ///
 /// # Errors
-/// They are held out and were used: by other code, or another number of them. One who sees a result and then changes either
-/// judges by a seed that is no longer held out.
+/// They are held out, and were used by other code or for another number of runs. Who sees a result and then changes either
+/// judges by seeds that are no longer held out.
 fn earlier(list: &List, name: &str, measurement: &Measurement, asked: &Asked) -> Result<Vec<Earlier>> {
     if measurement.seeds != Seeds::HeldOut {
         return Ok(Vec::new());
     }
-    let kept = all_kept(list)?;
-    let mut why_not = None;
-    for (of, kept) in kept
+    let mut kept: BTreeMap<String, Origin> = all_kept(list)?
+        .into_iter()
+        .map(|(name, kept)| (name, kept.origin))
+        .collect();
+    kept.retain(|_, origin| origin.first_seed == list.held_out_from);
+    let mut used = BTreeMap::new();
+    for (of, origin) in &kept {
+        let is_other = !stale::is_known(&origin.commit)
+            || !stale::changed(&origin.commit, &list.measurement[of].judged)?.is_empty();
+        used.insert(of.as_str(), (origin, is_other));
+    }
+    uses(name, asked.count(measurement.rule), asked.again, &used)
+}
+
+/// By name, where held-out seeds were used, and whether the code was other than now.
+fn uses(
+    name: &str,
+    count: Rule,
+    again: Option<&str>,
+    used: &BTreeMap<&str, (&Origin, bool)>,
+) -> Result<Vec<Earlier>> {
+    let is_another =
+        |of: &str, origin: &Origin, is_other: bool| is_other || (of == name && origin.count != count);
+    let mut others = used
         .iter()
-        .filter(|(_, kept)| kept.origin.first_seed == list.held_out_from)
-    {
-        let changed = stale::changed(&kept.origin.commit, &list.measurement[of].judged)?;
-        if !changed.is_empty() {
-            why_not = Some(format!("{of} used them at another {}", changed.join(", ")));
+        .filter(|(of, (origin, is_other))| is_another(of, origin, *is_other));
+    let own = used.get(name).map(|(own, _)| own.earlier.clone());
+    let mut earlier = own.unwrap_or_default();
+    let Some(again) = again else {
+        if let Some((of, (origin, is_other))) = others.next() {
+            let commit = &origin.commit[..12];
+            let how = match is_other {
+                true => format!("{of} at {commit}, when the code was another"),
+                false => format!("{of} at {commit} with {}", origin.count),
+            };
+            bail!(Usage(format!(
+                "{name}: its seeds are held out and were used by {how}. Set held_out_from to a seed that was never used, or say why \
+                 in --again; the documents then say it"
+            )));
         }
-    }
-    let own = kept.get(name).map(|kept| &kept.origin);
-    let own = own.filter(|own| own.first_seed == list.held_out_from);
-    if let Some(own) = own.filter(|own| own.count != asked.count(measurement.rule)) {
-        why_not = why_not.or(Some(format!("they were used for {}", own.count)));
-    }
-    let mut earlier = own.map(|own| own.earlier.clone()).unwrap_or_default();
-    match (why_not, asked.again) {
-        (None, _) => {}
-        (Some(why_not), None) => bail!(Usage(format!(
-            "{name}: its seeds are held out, and used once: {why_not}. Set held_out_from to a seed that was never used, or say why in \
-             --again; the documents then say it"
-        ))),
-        (Some(_), Some(again)) => earlier.extend(kept.get(name).map(|kept| Earlier {
-            commit: kept.origin.commit.clone(),
-            count: kept.origin.count,
+        return Ok(earlier);
+    };
+    for (_, (origin, _)) in others {
+        let use_ = Earlier {
+            commit: origin.commit.clone(),
+            count: origin.count,
             again: again.into(),
-        })),
+        };
+        if !earlier.contains(&use_) {
+            earlier.push(use_);
+        }
     }
     Ok(earlier)
 }
@@ -267,7 +291,57 @@ fn rows_of(table: &str, on_target: bool) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::rows_of;
+    use std::collections::BTreeMap;
+
+    use super::super::kept::Origin;
+    use super::super::list::Rule;
+    use super::{rows_of, uses};
+
+    /// What the uses of held-out seeds allow to "relying" with so many of them, and what is then said of earlier ones.
+    fn said(of: &str, is_other: bool, seeds: u64, again: Option<&str>) -> Result<Vec<String>, String> {
+        let origin = Origin {
+            command: String::new(),
+            commit: "0123456789abcdef".into(),
+            date: String::new(),
+            rule: Rule::Seeds(200),
+            count: Rule::Seeds(200),
+            first_seed: 77,
+            held_out: true,
+            earlier: Vec::new(),
+        };
+        let used = BTreeMap::from([(of, (&origin, is_other))]);
+        let earlier = uses("relying", Rule::Seeds(seeds), again, &used).map_err(|e| e.to_string())?;
+        Ok(earlier
+            .into_iter()
+            .map(|one| format!("{} {}", one.commit, one.again))
+            .collect())
+    }
+
+    #[test]
+    fn held_out_seeds_are_used_by_one_state_of_the_code_and_for_one_count() {
+        assert_eq!(said("relying", false, 200, None), Ok(Vec::new()));
+        assert_eq!(said("paper", false, 100, None), Ok(Vec::new()));
+        let error = said("paper", true, 200, None).unwrap_err();
+        assert!(
+            error.contains("by paper at 0123456789ab, when the code was another"),
+            "{error}"
+        );
+        let error = said("relying", false, 100, None).unwrap_err();
+        assert!(
+            error.contains("by relying at 0123456789ab with 200 seeds"),
+            "{error}"
+        );
+        for (of, is_other, seeds) in [
+            ("paper", true, 200),
+            ("relying", true, 200),
+            ("relying", false, 100),
+        ] {
+            assert_eq!(
+                said(of, is_other, seeds, Some("why")),
+                Ok(vec!["0123456789abcdef why".to_owned()])
+            );
+        }
+    }
 
     #[test]
     fn rows_run_where_the_table_says() {

@@ -58,7 +58,7 @@ pub(super) fn state(measurement: &Measurement, kept: Option<&Kept>) -> Result<St
         return Ok(State::Missing);
     };
     let commit = origin.commit[..12.min(origin.commit.len())].to_owned();
-    if output(command("git").args(["cat-file", "-t", &origin.commit])).is_err() {
+    if !is_known(&origin.commit) {
         return Ok(State::Unknown(commit));
     }
     let command = measurement.arguments(origin.count, origin.first_seed);
@@ -76,6 +76,12 @@ pub(super) fn state(measurement: &Measurement, kept: Option<&Kept>) -> Result<St
         },
         false => State::Changed(commit, files),
     })
+}
+
+/// Whether this repository has a commit.
+pub(super) fn is_known(commit: &str) -> bool {
+    let found = command("git").args(["cat-file", "-e", commit]).output();
+    found.is_ok_and(|found| found.status.success())
 }
 
 /// Files below these paths whose code is not that of a commit. Comments and empty lines are no code.
