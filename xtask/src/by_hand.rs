@@ -15,16 +15,30 @@ const LIST: &str = "core/tests/mutants.toml";
 /// fail.
 type List = BTreeMap<PathBuf, BTreeMap<String, [String; 3]>>;
 
-/// Applies each; an error names those that no test noticed.
-pub(crate) fn run() -> Result<()> {
+/// Applies each that is [wanted](choose); an error names those that no test noticed.
+pub(crate) fn run(words: &[String], base: Option<&str>) -> Result<()> {
     let text = fs::read_to_string(tool::root().join(LIST)).context(LIST)?;
     let list: List = toml::from_str(&text).context(LIST)?;
     ensure!(!list.is_empty(), "{LIST} has no defect");
+    let list = choose(list, words, &changed_since(base)?)?;
+    let all: usize = list.values().map(BTreeMap::len).sum();
+    if all == 0 {
+        println!("no file that differs has a defect in {LIST}");
+        return Ok(());
+    }
     let copy = tool::root().join("target/by-hand");
     copy_sources(&copy)?;
     // First of all the copy as it is: what fails there anyway would notice everything.
-    let said = test(&copy, &["--lib", "--test", "all"])?;
-    for [.., name] in list.values().flat_map(BTreeMap::values) {
+    let names = list
+        .values()
+        .flat_map(BTreeMap::values)
+        .map(|[.., name]| name.as_str());
+    let names: Vec<&str> = names.collect();
+    let said = test(
+        &copy,
+        &[&["--lib", "--test", "all", "--", "--exact"], &names[..]].concat(),
+    )?;
+    for name in names {
         ensure!(
             said.contains(&format!("test {name} ... ok")),
             "without a defect {name} does not pass:\n{said}"
@@ -51,18 +65,51 @@ pub(crate) fn run() -> Result<()> {
             let said = test(&copy, &[program, &["--", "--exact", name]].concat())?;
             fs::write(&path, &source)?;
             if said.contains(&format!("test {name} ... FAILED")) {
-                println!("killed    {defect} ({name})");
+                println!("{count:>3}/{all} noticed   {defect} ({name})");
             } else if said.contains("error: could not compile") {
                 bail!("{defect}: the defect does not compile:\n{said}");
             } else {
-                println!("SURVIVED  {defect} ({name})");
+                println!("{count:>3}/{all} SURVIVED  {defect} ({name})");
                 survivors.push(defect.as_str());
             }
         }
     }
     ensure!(survivors.is_empty(), "not noticed: {}", survivors.join("; "));
-    println!("all {count} defects made by hand are noticed");
+    println!("{count} defects made by hand are noticed");
     Ok(())
+}
+
+/// The defects that are asked for: of a file whose path ends in one of the words, or with a word in their name; and of
+/// files that differ.
+///
+/// # Errors
+/// A word that no defect fits.
+fn choose(mut list: List, words: &[String], differs: &dyn Fn(&Path) -> bool) -> Result<List> {
+    let fits = |file: &Path, defect: &str, word: &str| file.ends_with(word) || defect.contains(word);
+    for word in words {
+        let mut all = list
+            .iter()
+            .flat_map(|(file, defects)| defects.keys().map(move |defect| (file, defect)));
+        if !all.any(|(file, defect)| fits(file, defect, word)) {
+            let message = format!("{word}: {LIST} has no such file, and no defect with this in its name");
+            return Err(tool::Usage(message).into());
+        }
+    }
+    list.retain(|file, defects| {
+        defects.retain(|defect, _| words.is_empty() || words.iter().any(|word| fits(file, defect, word)));
+        !defects.is_empty() && differs(file)
+    });
+    Ok(list)
+}
+
+/// Whether a file differs from a commit, branch or tag; any file if there is none.
+fn changed_since(base: Option<&str>) -> Result<impl Fn(&Path) -> bool> {
+    let names = |base| tool::output(tool::command("git").args(["diff", "--name-only", base, "--"]));
+    let changed = base.map(names).transpose()?;
+    Ok(move |file: &Path| {
+        let changed = changed.as_deref();
+        changed.is_none_or(|changed| changed.lines().any(|line| Path::new(line) == file))
+    })
 }
 
 /// What the tests print.
@@ -109,4 +156,39 @@ fn copy_all(from: &Path, to: &Path) -> Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{List, choose};
+    use std::path::Path;
+
+    fn chosen(words: &[&str], differs: &dyn Fn(&Path) -> bool) -> anyhow::Result<Vec<String>> {
+        let list: List = toml::from_str(
+            "['core/src/ecu/mod.rs']\n'a veto' = ['a', 'b', 't']\n\
+             ['core/src/law/mod.rs']\n'a sign' = ['a', 'b', 't']\n'a share' = ['a', 'b', 't']\n",
+        )?;
+        let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+        let chosen = choose(list, &words, differs)?;
+        Ok(chosen
+            .into_values()
+            .flat_map(|defects| defects.into_keys())
+            .collect())
+    }
+
+    #[test]
+    fn defects_are_chosen_by_file_by_name_and_by_what_differs() {
+        let any = |_: &Path| true;
+        assert_eq!(chosen(&[], &any).unwrap(), ["a veto", "a share", "a sign"]);
+        assert_eq!(chosen(&["law/mod.rs"], &any).unwrap(), ["a share", "a sign"]);
+        assert_eq!(chosen(&["sign", "veto"], &any).unwrap(), ["a veto", "a sign"]);
+        let law = |file: &Path| file == Path::new("core/src/law/mod.rs");
+        assert_eq!(chosen(&["mod.rs"], &law).unwrap(), ["a share", "a sign"]);
+        assert!(chosen(&["veto"], &law).unwrap().is_empty());
+        assert!(
+            chosen(&["low/mod.rs"], &any)
+                .unwrap_err()
+                .is::<crate::tool::Usage>()
+        );
+    }
 }

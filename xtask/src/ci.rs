@@ -18,8 +18,8 @@ use crate::boards::Board;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
-    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, profiles, python, trace,
-    venv, web, wheel,
+    bench, bindings_agree, boards, by_hand, c_library, coverage, evidence, fmu, gate, logs, mutants,
+    profiles, python, trace, venv, web, wheel,
 };
 
 /// Which stages run.
@@ -86,7 +86,9 @@ const STAGES: &[Stage] = stages! {
     "c" Beside "the C library and its header, on the host and in QEMU": || c_library::check(Built::ForTests);
     "bindings-agree" Beside "the same frames from every binding": || bindings_agree::check(Built::ForTests);
     "requirements" Beside "every requirement has its evidence": || trace::run(false);
+    "evidence" Beside "the documents' tables of figures are those that were measured": evidence::check;
     "xtask" Beside "tests of xtask itself": xtask_tests;
+    "evidence-stale" Full "no figure is older than the code that it judges": evidence::stale;
     "all-boards" Full "the same of all boards, the real ones' images among them":
         || boards::check(boards::Scope::All, Built::ForTests, false);
     "wheel" Full "the wheel as it is handed on, installed and tested":
@@ -96,9 +98,9 @@ const STAGES: &[Stage] = stages! {
     "page-shipped" Full "the page as it is handed on": || web::check(Built::ToShip);
     "same-bits" Full "an evaluation in every profile: the same bytes": profiles::check;
     "instructions" Full "instructions of a step on the host, against xtask/golden.json": || bench::run(false);
-    "coverage" Full "every line and branch of core": evidence::coverage;
-    "defects-by-hand" Full "defects made by hand in core: each is noticed": by_hand::run;
-    "mutants" Full "a defect in every expression of core: each is noticed": || evidence::mutants(&[], None);
+    "coverage" Full "every line and branch of core": coverage::check;
+    "defects-by-hand" Full "defects made by hand in core: each is noticed": || by_hand::run(&[], None);
+    "mutants" Full "a defect in every expression of core: each is noticed": || mutants::check(&[], None);
     "fuzz" Full "a million inputs for every reader, a thousand million bytes for the ECU": fuzz;
     "campaign" Full "every fault, 500 seeds, in the paper's world and four real ones": campaign;
     "sanitised" Full "core, log and C library with AddressSanitizer": sanitised;

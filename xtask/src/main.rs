@@ -11,6 +11,7 @@ mod c_library;
 mod callgrind;
 mod ci;
 mod code;
+mod coverage;
 mod evidence;
 mod fmu;
 mod gate;
@@ -19,6 +20,7 @@ mod identify;
 mod image;
 mod logs;
 mod longest;
+mod mutants;
 mod profiles;
 mod python;
 mod qemu;
@@ -65,17 +67,20 @@ enum Command {
     },
     /// Line, region and branch coverage of the core by its tests: all lines and branches, or exit code 1.
     Coverage,
+    /// Figures that documents show (docs/evidence.toml): measures those that are named, keeps them in docs/evidence/ with
+    /// their commit, seeds and rule, and writes the tables. Without a name: lists them.
+    Evidence(evidence::Options),
     /// A defect in every expression of the core (needs cargo-mutants; an hour or more). One that no test notices is
     /// printed, and is exit code 1; what cannot be noticed is listed in .cargo/mutants.toml with its reason.
     Mutants {
-        /// Only these files, such as ecu/receivers.rs
+        /// Only these files, such as ecu/receivers.rs; with --by-hand also defects with this in their name
         #[arg(value_name = "FILE")]
         files: Vec<String>,
-        /// Only in lines that differ from this commit, branch or tag
+        /// Only in lines that differ from this commit, branch or tag; with --by-hand in files that do
         #[arg(long, value_name = "BASE")]
         in_diff: Option<String>,
         /// Instead, the defects made by hand of core/tests/mutants.toml: exit code 1 if one is not noticed.
-        #[arg(long, conflicts_with_all = ["in_diff", "files"])]
+        #[arg(long)]
         by_hand: bool,
     },
     /// Every board: builds without a warning, no panic and no float in its torque path; flash, RAM, stack and
@@ -158,9 +163,16 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Ci(options) => ci::check(&options),
         Command::Gate => gate::run(),
-        Command::Coverage => evidence::coverage(),
-        Command::Mutants { by_hand: true, .. } => by_hand::run(),
-        Command::Mutants { files, in_diff, .. } => evidence::mutants(&files, in_diff.as_deref()),
+        Command::Coverage => coverage::check(),
+        Command::Evidence(options) => evidence::run(&options),
+        Command::Mutants {
+            files,
+            in_diff,
+            by_hand,
+        } => {
+            let check = if by_hand { by_hand::run } else { mutants::check };
+            check(&files, in_diff.as_deref())
+        }
         Command::Boards { bless } => boards::check(boards::Scope::All, Built::ToShip, bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),

@@ -81,12 +81,18 @@ pub struct CaseResult {
     pub peak_torque_nm: f64,
     /// Whether the row asks the ECU to leave.
     pub asks_to_leave: bool,
+    /// Whether the row lets the ECU leave: it asks for it, or the ECU may notice that something is wrong.
+    pub may_leave: bool,
     /// Runs in which the ECU noticed something: it reported a fault after the onset, or left.
     pub noticed: u64,
     /// Their share, from and to, 95 %.
     pub noticed_interval: [f64; 2],
     /// From the onset until then, ms: the median of those runs, and what 95 % of them keep.
     pub noticed_after_ms: [Option<u32>; 2],
+    /// Largest deviation of the runs in which it noticed nothing, m.
+    pub unnoticed_deviation_m: Option<f64>,
+    /// Largest torque of these runs, N.m.
+    pub unnoticed_torque_nm: Option<f64>,
     /// Runs in which the ECU left: a handover, a fade, a latched fault.
     pub left: u64,
     /// From the onset until it left, ms: the median of those runs and the longest.
@@ -99,6 +105,10 @@ pub struct CaseResult {
     pub dropped_m: Option<f64>,
     /// Most that a run went further than that, m.
     pub excess_m: Option<f64>,
+    /// Runs that went further than that by more than is allowed.
+    pub beyond_drop: u64,
+    /// Runs whose deviation is more than the drivers' limit allows.
+    pub beyond_limit: u64,
     /// Largest distance from the vehicle whose torque is cut at the onset, m; of class C alone.
     pub pushed_m: Option<f64>,
     /// Runs in which the vehicle left its lane and the fault-free one did not.
@@ -206,16 +216,12 @@ pub(super) fn result(
         )),
         None => {
             let at_ms = outcome.onset_ms + outcome.left_after_ms.unwrap_or_default();
-            let further = too_far(&outcome.deviation).filter(|_| row.obeys());
-            let beyond = || beyond(&outcome.deviation, limits).filter(|_| row.is_limited());
-            Some(failed(
-                outcome,
-                FailedBy::Vehicle,
-                at_ms,
-                further.or_else(beyond)?,
-            ))
+            let what = too_far(row, &outcome.deviation);
+            let what = what.or_else(|| beyond(row, &outcome.deviation, limits))?;
+            Some(failed(outcome, FailedBy::Vehicle, at_ms, what))
         }
     });
+    let count = |of: &dyn Fn(&TrialOutcome) -> bool| outcomes.iter().filter(|o| of(o)).count() as u64;
     let most = |of: fn(&TrialOutcome) -> Option<f64>| outcomes.iter().filter_map(of).reduce(f64::max);
     let sorted_ms = |of: fn(&TrialOutcome) -> Option<u32>| {
         let mut times: Vec<u32> = outcomes.iter().filter_map(of).collect();
@@ -233,16 +239,19 @@ pub(super) fn result(
         class: row.class,
         place: row.place,
         runs: outcomes.len() as u64,
-        seen: outcomes.iter().filter(|o| o.seen).count() as u64,
+        seen: count(&|o| o.seen),
         cycles: outcomes.iter().map(|o| o.cycles).sum(),
         deadline_ms: row.deadline_ms(),
         worst_reaction_ms: outcomes.iter().filter_map(|o| o.reaction_ms).max(),
         torque_bound_nm: row.torque_nm,
         peak_torque_nm: outcomes.iter().map(|o| o.peak_nm).fold(0.0, f64::max),
         asks_to_leave: row.asks_to_leave(),
+        may_leave: row.may_leave(),
         noticed: noticed_after_ms.len() as u64,
         noticed_interval: share(noticed_after_ms.len()),
         noticed_after_ms: [50, 95].map(|percent| quantile(&noticed_after_ms, percent)),
+        unnoticed_deviation_m: most(|o| unnoticed(o).map(|o| o.deviation.faulted_m)),
+        unnoticed_torque_nm: most(|o| unnoticed(o).map(|o| o.peak_nm)),
         left: left_after_ms.len() as u64,
         left_after_ms: left_after_ms
             .last()
@@ -251,14 +260,21 @@ pub(super) fn result(
         deviation_m: most(|o| Some(o.deviation.faulted_m)).unwrap_or_default(),
         dropped_m: most(|o| o.deviation.dropped_m),
         excess_m: most(|o| o.deviation.excess_m()),
+        beyond_drop: count(&|o| too_far(row, &o.deviation).is_some()),
+        beyond_limit: count(&|o| beyond(row, &o.deviation, limits).is_some()),
         pushed_m: most(|o| o.deviation.pushed_m),
         left_lane: left_lane as u64,
         left_lane_interval: share(left_lane),
         is_limited: row.is_limited(),
         leaves_too_often: row.is_limited() && limits.left_lane.is_some_and(|most| share(left_lane)[0] > most),
-        off_road: outcomes.iter().filter(|o| o.deviation.is_off_road()).count() as u64,
+        off_road: count(&|o| o.deviation.is_off_road()),
         failures: failures.collect(),
     }
+}
+
+/// A run in which the ECU noticed nothing.
+fn unnoticed(outcome: &TrialOutcome) -> Option<&TrialOutcome> {
+    outcome.noticed_after_ms.is_none().then_some(outcome)
 }
 
 /// What so many percent of sorted values do not exceed; `None` of nothing.
@@ -268,8 +284,8 @@ fn quantile<T: Copy>(sorted: &[T], percent: usize) -> Option<T> {
 }
 
 /// What is wrong with a deviation by itself.
-fn beyond(deviation: &Deviation, limits: Limits) -> Option<String> {
-    (deviation.faulted_m > limits.deviation_m && !deviation.is_off_road()).then(|| {
+fn beyond(row: &FaultCase, deviation: &Deviation, limits: Limits) -> Option<String> {
+    (row.is_limited() && deviation.faulted_m > limits.deviation_m && !deviation.is_off_road()).then(|| {
         format!(
             "the vehicle went {:.2} m aside, {:.2} m are allowed with these drivers",
             deviation.faulted_m, limits.deviation_m
@@ -278,12 +294,15 @@ fn beyond(deviation: &Deviation, limits: Limits) -> Option<String> {
 }
 
 /// What is wrong with where a vehicle went, if anything is.
-fn too_far(deviation: &Deviation) -> Option<String> {
+fn too_far(row: &FaultCase, deviation: &Deviation) -> Option<String> {
     let (excess_m, dropped_m) = (deviation.excess_m()?, deviation.dropped_m?);
-    (excess_m > MOST_EXCESS_M && !deviation.is_off_road()).then(|| {
+    (row.obeys() && excess_m > MOST_EXCESS_M && !deviation.is_off_road()).then(|| {
         format!(
             "the vehicle went {:.2} m aside, {dropped_m:.2} m had the torque been dropped",
             deviation.faulted_m
         )
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -260,6 +260,11 @@ impl FaultCase {
         }
     }
 
+    /// Whether guidance may end, because something is wrong that the ECU may notice.
+    pub fn may_leave(&self) -> bool {
+        self.asks_to_leave() || matches!(self.expect, Expect::MayHandOver | Expect::OnlyRules)
+    }
+
     /// Whether the motor does what the ECU says, so that the ECU decides where the vehicle goes.
     pub(super) fn obeys(&self) -> bool {
         !self.injections.contains(&Injection::Motor(Motor::Stuck))

@@ -21,7 +21,7 @@ pub(super) struct Arguments {
     /// Runs of each row: N seeds from the first on
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: u64,
-    /// The first seed. The limits were chosen with seeds 1 to 500; docs/explanation/hazard-analysis.md judges by those from 86028121 on
+    /// The first seed. The limits were chosen with seeds 1 to 500; docs/evidence.toml names those that nothing was chosen with
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::MAX - 1_000_001))]
     first_seed: u64,
     /// One seed alone, to run a failure again; shows what the ECU reported
