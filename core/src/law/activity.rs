@@ -120,3 +120,36 @@ fn low_pass(sum: i64, new: i64, weight: u32) -> i64 {
     let lower = u64::from(away as u32).wrapping_mul(u64::from(weight)) >> 32;
     sum.saturating_add(upper.wrapping_add(lower.cast_signed()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flipped bit may make anything of what is kept once.
+    #[test]
+    fn whatever_is_remembered_the_share_is_within_its_bounds() {
+        let least = Ratio::from_si(0.05);
+        for against in [i32::MIN, -1, 0, 1, 1 << 23, 1 << 24, (1 << 24) + 1, i32::MAX] {
+            let activity = Activity {
+                against: Ratio::from_bits(against),
+                ..Activity::NEW
+            };
+            let share = activity.share(least);
+            // 1 - 0.95*against between 0 and 1, by hand.
+            let expected = 1.0 - 0.95 * (f64::from(against) / 16_777_216.0).clamp(0.0, 1.0);
+            assert!((share.si() - expected).abs() < 1e-6, "{against}: {}", share.si());
+        }
+        for (agreement, size) in [
+            (i64::MIN, i64::MIN),
+            (i64::MIN, 0),
+            (i64::MIN, i64::MAX),
+            (-1, -1),
+        ] {
+            let against = against(agreement, size);
+            assert!(
+                against >= Ratio::ZERO && against <= Ratio::ONE,
+                "{agreement} {size}"
+            );
+        }
+    }
+}
