@@ -13,13 +13,17 @@ use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, pe
 use crate::safety::actuator::Actuator;
 use crate::safety::faults::Fault;
 use crate::safety::monitor::Frames;
-use crate::safety::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
+use crate::safety::plausibility::{
+    BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible, speeds_agree,
+};
 use crate::safety::redundant::{Redundant, Words};
 
 /// The column's frames come at this rate.
 const COLUMN_PERIOD_US: u32 = 2000;
 /// A span longer than half a wrap of the clock is negative: the other instant is the later one.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
+/// In this time brakes change a speed by as much as one message may.
+const STEP_BY_BRAKES: Micros = Micros::from_us(83_333);
 /// A vehicle slower than this stands.
 const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
 /// How many Vehicle messages in a row must be accepted before the vehicle counts as standing.
@@ -255,8 +259,8 @@ fn take_preview(slot: &mut Slot<LaneSample>, lane: &LanePreview, now: Instant) -
     Ok(())
 }
 
-/// The speeds to use of a message. One that steps, of a wheel that locks, slips or spins, follows the other one; where both
-/// do, they are held. `None` if that lasts for longer than [`SPEEDS_PATIENCE`].
+/// The speeds to use of a message. One that steps, of a wheel that locks, slips or spins, follows the other one, unless the two
+/// new ones agree: then it came back. Where both step, they are held. `None` if that lasts for longer than [`SPEEDS_PATIENCE`].
 fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
     let Some(last) = slot.last() else {
         slot.doubt = 0;
@@ -270,19 +274,31 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
         let follows = |last: Speed, new: Speed| speed_step_is_possible(last, new, held);
         [follows(a_before, a), follows(b_before, b)]
     };
-    // Two that are held may be left behind by the vehicle; one goes with the other.
+    let agree = speeds_agree(a, b);
+    // Two that are held may be left behind by the vehicle, and by a step more where they agree: wheels that come back from a
+    // slip. One goes with the other.
+    let more = if agree && slot.doubt > 0 {
+        STEP_BY_BRAKES.us()
+    } else {
+        0
+    };
     let follows = match follow_within(Micros::from_us(0)) {
-        [false, false] => follow_within(lasts(slot.doubt)),
+        [false, false] => follow_within(Micros::from_us(lasts(slot.doubt).us().saturating_add(more))),
         follows => follows,
     };
+    let is_taken = match follows {
+        [true, true] => true,
+        [false, false] => false,
+        _ => agree,
+    };
+    if is_taken {
+        slot.doubt = 0;
+        return Some(speeds);
+    }
     let followed = match follows {
-        [true, true] => {
-            slot.doubt = 0;
-            return Some(speeds);
-        }
-        [true, false] => [a, moved(b_before, a, a_before)],
-        [false, true] => [moved(a_before, b, b_before), b],
-        [false, false] => last.speeds,
+        [true, _] => [a, moved(b_before, a, a_before)],
+        [_, true] => [moved(a_before, b, b_before), b],
+        _ => last.speeds,
     };
     let doubt = slot.doubt.saturating_add(1);
     let is_short = lasts(doubt) <= SPEEDS_PATIENCE;
