@@ -22,8 +22,6 @@ use crate::safety::redundant::{Redundant, Words};
 const COLUMN_PERIOD_US: u32 = 2000;
 /// A span longer than half a wrap of the clock is negative: the other instant is the later one.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
-/// In this time brakes change a speed by as much as one message may.
-const STEP_BY_BRAKES: Micros = Micros::from_us(83_333);
 /// A vehicle slower than this stands.
 const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
 /// How many Vehicle messages in a row must be accepted before the vehicle counts as standing.
@@ -275,15 +273,9 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
         [follows(a_before, a), follows(b_before, b)]
     };
     let agree = speeds_agree(a, b);
-    // Two that are held may be left behind by the vehicle, and by a step more where they agree: wheels that come back from a
-    // slip. One goes with the other.
-    let more = if agree && slot.doubt > 0 {
-        STEP_BY_BRAKES.us()
-    } else {
-        0
-    };
+    // Two that are held may be left behind by the vehicle; one goes with the other.
     let follows = match follow_within(Micros::from_us(0)) {
-        [false, false] => follow_within(Micros::from_us(lasts(slot.doubt).us().saturating_add(more))),
+        [false, false] => follow_within(lasts(slot.doubt)),
         follows => follows,
     };
     let is_taken = match follows {

@@ -383,7 +383,7 @@ impl Receivers {
     }
 
     /// A speed that steps by more than 1 m/s goes with the other, unless both are now within 2 m/s; two are held, and may then be
-    /// left behind by 12 m/s2, two within 2 m/s by 1 m/s more.
+    /// left behind by 12 m/s2.
     fn followed(&mut self, speeds: [f64; 2]) -> Option<[f64; 2]> {
         let Some(Motion { speeds: last, .. }) = self.motion.value else {
             self.motion.doubt = 0;
@@ -393,9 +393,8 @@ impl Receivers {
         let held_us = self.motion.doubt * self.motion.period_us;
         let steps = |most: f64| moved.map(|moved| exceeds(moved.abs(), most));
         let agree = exceeds(2.0, (speeds[0] - speeds[1]).abs());
-        let more = if agree && self.motion.doubt > 0 { 1.0 } else { 0.0 };
         let steps = match steps(1.0) {
-            [true, true] => steps(1.0 + more + per_second(12.0, held_us)),
+            [true, true] => steps(1.0 + per_second(12.0, held_us)),
             one => one,
         };
         let both_step = steps == [true; 2];
