@@ -441,6 +441,29 @@ fn one_lsb_beyond_the_range_is_rejected_when_received() {
     }
 }
 
+/// Either speed: 0 and 90 m/s are in range, the counts beyond and -1 m/s are not.
+#[test]
+fn a_speed_is_in_range_from_0_to_90() {
+    for start in [12, 28] {
+        for (raw, is_in_range) in [
+            (0, true),
+            (23_040, true),
+            (-1, false),
+            (-256, false),
+            (-32_768, false),
+            (23_041, false),
+            (32_767, false),
+        ] {
+            let word = (i64::from(raw) as u64 & 0xFFFF) << start;
+            assert_eq!(
+                Vehicle::unpack(&word.to_le_bytes()).is_some(),
+                is_in_range,
+                "{start} {raw}"
+            );
+        }
+    }
+}
+
 /// The raw value -8192 of a yaw rate has no counterpart to the left, so it is no value; where the sender says that it has
 /// no good one, nobody looks at it. Beyond the range a value saturates when it is sent.
 #[test]

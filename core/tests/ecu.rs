@@ -312,14 +312,17 @@ fn a_silence_of_20_ms_is_no_fault() {
 
 #[test]
 fn one_bad_frame_is_rejected_and_the_last_good_one_stays() {
-    for (what, wanted) in [
-        ("crc", Reject::Crc),
-        ("length", Reject::Length),
-        ("repeat", Reject::Repeated),
-    ] {
+    for (sender, what, wanted) in (0..4).flat_map(|sender| {
+        [
+            (sender, "crc", Reject::Crc),
+            (sender, "length", Reject::Length),
+            (sender, "repeat", Reject::Repeated),
+            (sender, "jump", Reject::Jump),
+        ]
+    }) {
         let mut rig = Rig::active_in_curve(1.0);
         let before = rig.applied;
-        let good = rig.frame(LANE);
+        let good = rig.frame(sender);
         let bad = match what {
             "crc" => {
                 let mut bytes: [u8; 8] = good.data().try_into().unwrap();
@@ -327,14 +330,20 @@ fn one_bad_frame_is_rejected_and_the_last_good_one_stays() {
                 Frame::new(good.id(), &bytes).unwrap()
             }
             "length" => Frame::new(good.id(), &good.data()[..7]).unwrap(),
-            _ => {
+            "repeat" => {
                 rig.send(&good).unwrap();
                 good
             }
+            _ => {
+                rig.send(&good).unwrap();
+                // Four ahead, or five: the column's window is open by another for each 2 ms.
+                let mut ahead = rig.clone();
+                (0..5).map(|_| ahead.frame(sender)).last().unwrap()
+            }
         };
-        assert_eq!(rig.send(&bad), Err(wanted));
+        assert_eq!(rig.send(&bad), Err(wanted), "{sender} {what}");
         assert_eq!(rig.run(100).command.mode, Mode::Active);
-        assert!((rig.applied - before).abs() < 0.001, "{what}");
+        assert!((rig.applied - before).abs() < 0.001, "{sender} {what}");
     }
     // Another message's frame under this identifier, and a frame of no interest.
     let mut rig = Rig::active_in_curve(1.0);

@@ -311,3 +311,54 @@ fn a_frame_with_the_crc_of_another_is_no_repetition() {
             .all(|(rogue, honest)| rogue.is_err() && honest.is_err())
     );
 }
+
+/// A camera of 15 Hz leaves 67 ms for a rogue, in which the fastest camera would count sixteen.
+#[test]
+fn a_slow_sender_is_not_counted_round() {
+    for (sender, period) in [(LANE, 66), (COLUMN, 20), (VEHICLE, 25), (REQUEST, 25)] {
+        let mut rig = Rig::active_in_curve(0.0);
+        let (mut refused, mut sent) = (0, 0);
+        let lies: [fn(u32, u8) -> Frame; 4] = [lane, column, slower, engage];
+        for ms in 0..8000_u32 {
+            let place = ms % period;
+            let counter = rig.counters[sender].wrapping_sub(1);
+            if place == 0 {
+                let frame = rig.frame(sender);
+                let said = rig.send(&frame);
+                // Its pace is known after two seconds.
+                refused += u32::from(ms > 2000 && said.is_err());
+            }
+            // Two counts each, over the whole period, and as many as come round.
+            if ms >= 2000 && place > 0 && place % (period / 9) == 0 && place / (period / 9) <= 8 {
+                let ahead = 2 * (place / (period / 9)) as u8;
+                sent += 1;
+                let _ = rig.send(&lies[sender](0, counter.wrapping_add(ahead)));
+            }
+            rig.silent[sender] = true;
+            let _ = tick_uncounted(&mut rig, sender);
+        }
+        assert!(
+            sent > 500 && refused > 20,
+            "sender {sender}: {refused} refused beside {sent}"
+        );
+    }
+}
+
+/// Fifteen contradictions and not sixteen leave the trust; 120 frames in order outweigh them.
+#[test]
+fn a_contradiction_is_forgotten() {
+    let mut rig = Rig::active_in_curve(0.0);
+    for _ in 0..3 {
+        for _ in 0..15 {
+            // The counter before the last, with another content.
+            let old = engage(0, rig.counters[REQUEST].wrapping_sub(2));
+            assert_eq!(rig.send(&old), Err(Reject::Jump));
+        }
+        assert_eq!(rig.run(1210).command.mode, Mode::Active);
+    }
+    for _ in 0..16 {
+        let old = engage(0, rig.counters[REQUEST].wrapping_sub(2));
+        assert_eq!(rig.send(&old), Err(Reject::Jump));
+    }
+    assert_eq!(rig.tick().command.mode, Mode::Handover);
+}

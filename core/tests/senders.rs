@@ -101,6 +101,102 @@ fn wheels_that_slip_are_no_fault() {
     }
 }
 
+/// A slip that goes in and out by ramps of so many ms, and lasts `ms` between.
+fn ramps([into, ms, out]: [f64; 3], t_ms: f64) -> f64 {
+    let rising = if into > 0.0 { t_ms / into } else { 1.0 };
+    let falling = if out > 0.0 {
+        (into + ms + out - t_ms) / out
+    } else {
+        f64::from(t_ms < into + ms)
+    };
+    rising.min(falling).clamp(0.0, 1.0)
+}
+
+/// Drives through a slip of wheels as `sides` have it, m/s: guidance goes on, and no fault is told.
+fn rides_out(sides: [f64; 2], shape: [f64; 3]) -> Result<(), String> {
+    let mut rig = Rig::active_in_curve(1.0);
+    let length_ms = shape.iter().sum::<f64>() as u32 + 1500;
+    for ms in 0..length_ms {
+        let share = ramps(shape, f64::from(ms));
+        rig.speeds = sides.map(|slip| crate::rig::SPEED + slip * share);
+        let step = rig.tick();
+        if step.command.mode != Mode::Active || step.command.faults != FaultSet::NONE {
+            return Err(format!(
+                "{sides:?} {shape:?} after {ms} ms: {:?}",
+                step.command.faults
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Slowly away and fast back, either wheel, to both sides: what ended guidance every time. Where two new speeds agree they are
+/// taken.
+#[test]
+fn a_wheel_that_slips_slowly_and_comes_back_fast_is_no_fault() {
+    for sign in [1.0, -1.0] {
+        for wheel in [[1.0, 0.0], [0.0, 1.0]] {
+            let sides = |slip: f64| wheel.map(|share: f64| sign * share * slip);
+            // 1.2 m/s low for a second, then right at once; 3 m/s in 40 ms, and back in 10 or 20 ms.
+            for (slip, shape) in [
+                (1.2, [20.0, 1000.0, 0.0]),
+                (1.9, [1000.0, 1000.0, 0.0]),
+                (3.0, [40.0, 0.0, 10.0]),
+                (3.0, [40.0, 0.0, 20.0]),
+                (3.0, [40.0, 100.0, 10.0]),
+                (5.0, [60.0, 50.0, 0.0]),
+            ] {
+                assert_eq!(rides_out(sides(slip), shape), Ok(()));
+            }
+        }
+    }
+}
+
+/// Both wheels, by ramps of 0 to 1 s in and out: to 4.5 m/s, as 1 m/s and 12 m/s2 for 0.3 s are 4.6. A slip of more that went
+/// in slowly and comes back at once is a step of a vehicle, and ends guidance.
+#[test]
+fn both_wheels_slip_in_and_out_by_ramps() {
+    for slip in [-4.5, -3.0, -1.2, 1.2, 3.0, 4.5] {
+        for into in [0.0, 20.0, 100.0, 300.0, 1000.0] {
+            for out in [0.0, 10.0, 20.0, 50.0, 100.0, 1000.0] {
+                assert_eq!(rides_out([slip; 2], [into, 200.0, out]), Ok(()));
+            }
+        }
+    }
+    for slip in [-5.5, 5.5] {
+        assert!(rides_out([slip; 2], [1000.0, 200.0, 0.0]).is_err());
+    }
+}
+
+/// One of two that stays 2 m/s and more away is a fault after 0.3 s, however slowly it went.
+#[test]
+fn a_speed_that_dies_slowly_is_told() {
+    for sides in [[-15.0, 0.0], [0.0, -15.0], [15.0, 0.0], [0.0, 15.0]] {
+        for ramp_ms in [1000.0, 3000.0, 10_000.0] {
+            let mut rig = Rig::active_in_curve(1.0);
+            let away_ms = 2.0 / 15.0 * ramp_ms;
+            let mut told_ms = None;
+            for ms in 0..ramp_ms as u32 {
+                let share = f64::from(ms) / ramp_ms;
+                rig.speeds = sides.map(|slip| crate::rig::SPEED + slip * share);
+                let step = rig.tick();
+                if step.command.faults.contains(Fault::SpeedImplausible) {
+                    told_ms.get_or_insert(f64::from(ms));
+                }
+            }
+            let late_ms = told_ms.map(|ms| ms - away_ms);
+            assert!(
+                late_ms.is_some_and(|ms| (290.0..=325.0).contains(&ms)),
+                "{sides:?} {ramp_ms}: {late_ms:?}"
+            );
+        }
+    }
+    // A drift that stays within 2 m/s is none.
+    for sides in [[-1.9, 0.0], [0.0, -1.9], [1.9, 0.0], [0.0, 1.9]] {
+        assert_eq!(rides_out(sides, [5000.0, 1000.0, 5000.0]), Ok(()));
+    }
+}
+
 /// On a straight, 1.9 rad/s in two messages: nothing of it reaches the lane that goes on, or its check.
 #[test]
 fn a_yaw_rate_that_no_vehicle_has_is_left_out() {

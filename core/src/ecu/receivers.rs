@@ -13,7 +13,9 @@ use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, pe
 use crate::safety::actuator::Actuator;
 use crate::safety::faults::Fault;
 use crate::safety::monitor::Frames;
-use crate::safety::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
+use crate::safety::plausibility::{
+    BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible, speeds_agree,
+};
 use crate::safety::redundant::{Redundant, Words};
 
 /// The column's frames come at this rate.
@@ -255,8 +257,8 @@ fn take_preview(slot: &mut Slot<LaneSample>, lane: &LanePreview, now: Instant) -
     Ok(())
 }
 
-/// The speeds to use of a message. One that steps, of a wheel that locks, slips or spins, follows the other one; where both
-/// do, they are held. `None` if that lasts for longer than [`SPEEDS_PATIENCE`].
+/// The speeds to use of a message. One that steps, of a wheel that locks, slips or spins, follows the other one, unless the two
+/// new ones agree: then it came back. Where both step, they are held. `None` if that lasts for longer than [`SPEEDS_PATIENCE`].
 fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
     let Some(last) = slot.last() else {
         slot.doubt = 0;
@@ -270,19 +272,25 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
         let follows = |last: Speed, new: Speed| speed_step_is_possible(last, new, held);
         [follows(a_before, a), follows(b_before, b)]
     };
+    let agree = speeds_agree(a, b);
     // Two that are held may be left behind by the vehicle; one goes with the other.
     let follows = match follow_within(Micros::from_us(0)) {
         [false, false] => follow_within(lasts(slot.doubt)),
         follows => follows,
     };
+    let is_taken = match follows {
+        [true, true] => true,
+        [false, false] => false,
+        _ => agree,
+    };
+    if is_taken {
+        slot.doubt = 0;
+        return Some(speeds);
+    }
     let followed = match follows {
-        [true, true] => {
-            slot.doubt = 0;
-            return Some(speeds);
-        }
-        [true, false] => [a, moved(b_before, a, a_before)],
-        [false, true] => [moved(a_before, b, b_before), b],
-        [false, false] => last.speeds,
+        [true, _] => [a, moved(b_before, a, a_before)],
+        [_, true] => [moved(a_before, b, b_before), b],
+        _ => last.speeds,
     };
     let doubt = slot.doubt.saturating_add(1);
     let is_short = lasts(doubt) <= SPEEDS_PATIENCE;

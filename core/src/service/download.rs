@@ -132,12 +132,13 @@ impl Download {
     /// Takes a frame. Returns the set that it completes, every parameter within its range. Other messages, and frames
     /// that are damaged on the way, are ignored.
     pub fn receive(&mut self, frame: &Frame, conditions: &Conditions) -> Option<Set> {
+        let since_ms = |at: u32| conditions.now_ms.wrapping_sub(at);
         match frame.id() {
             ParameterUnlock::ID => {
                 let unlock = ParameterUnlock::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
                 let is_right = unlock.sequence == conditions.in_use;
                 let before = self.asked_ms.replace(conditions.now_ms);
-                let is_alone = before.is_none_or(|at| conditions.now_ms.wrapping_sub(at) >= UNLOCK_APART_MS);
+                let is_alone = before.is_none_or(|at| since_ms(at) >= UNLOCK_APART_MS);
                 self.unlocked_ms = (is_right && is_alone).then_some(conditions.now_ms);
                 self.vehicle = unlock.vehicle;
                 return None;
@@ -155,11 +156,8 @@ impl Download {
             return None;
         }
         let slot = self.values.get_mut(index).filter(|_| index == self.next);
-        let is_unlocked = self
-            .unlocked_ms
-            .is_some_and(|at| conditions.now_ms.wrapping_sub(at) <= UNLOCK_MS);
-        let took_ms = conditions.now_ms.wrapping_sub(self.began_ms);
-        let most = (took_ms / FIELD_MS).saturating_add(FIELDS_AT_ONCE);
+        let is_unlocked = self.unlocked_ms.is_some_and(|at| since_ms(at) <= UNLOCK_MS);
+        let most = (since_ms(self.began_ms) / FIELD_MS).saturating_add(FIELDS_AT_ONCE);
         self.outcome = match slot {
             _ if conditions.mode != Mode::Standby => WriteOutcome::NotInStandby,
             _ if !conditions.stands => WriteOutcome::NotStanding,

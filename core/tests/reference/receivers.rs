@@ -382,7 +382,8 @@ impl Receivers {
         Ok(())
     }
 
-    /// A speed that steps by more than 1 m/s goes with the other; two are held, and may then be left behind by 12 m/s2.
+    /// A speed that steps by more than 1 m/s goes with the other, unless both are now within 2 m/s; two are held, and may then be
+    /// left behind by 12 m/s2.
     fn followed(&mut self, speeds: [f64; 2]) -> Option<[f64; 2]> {
         let Some(Motion { speeds: last, .. }) = self.motion.value else {
             self.motion.doubt = 0;
@@ -391,18 +392,20 @@ impl Receivers {
         let moved = [speeds[0] - last[0], speeds[1] - last[1]];
         let held_us = self.motion.doubt * self.motion.period_us;
         let steps = |most: f64| moved.map(|moved| exceeds(moved.abs(), most));
+        let agree = exceeds(2.0, (speeds[0] - speeds[1]).abs());
         let steps = match steps(1.0) {
             [true, true] => steps(1.0 + per_second(12.0, held_us)),
             one => one,
         };
+        let both_step = steps == [true; 2];
+        if steps == [false; 2] || (agree && !both_step) {
+            self.motion.doubt = 0;
+            return Some(speeds);
+        }
         let followed = match steps {
-            [false, false] => {
-                self.motion.doubt = 0;
-                return Some(speeds);
-            }
-            [false, true] => [speeds[0], last[1] + moved[0]],
-            [true, false] => [last[0] + moved[1], speeds[1]],
-            [true, true] => last,
+            _ if both_step => last,
+            [false, _] => [speeds[0], last[1] + moved[0]],
+            _ => [last[0] + moved[1], speeds[1]],
         };
         self.motion.doubt += 1;
         (self.motion.doubt * self.motion.period_us <= 300_000).then_some(followed)

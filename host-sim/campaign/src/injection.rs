@@ -75,6 +75,14 @@ pub(super) enum Wire {
     Replayed(&'static [u16], usize),
     /// Another node sends each lane preview first, with an e_y' so many LSB to the left and the camera's own counter.
     Outrun(i64),
+    /// Another node sends six frames behind each of this message's, which end where its counter was and so are in order with all;
+    /// a field in each has another raw value: start, bits, how much more.
+    Between {
+        id: u16,
+        start: u32,
+        bits: u32,
+        more: i64,
+    },
     /// Senders repeat the counter that they had at the onset.
     CounterFrozen,
     /// One bit is flipped in the first so many frames of each message; in all if `None`.

@@ -154,6 +154,21 @@ impl Bus {
                 }
                 arrivals.push(good(*frame));
             }
+            Wire::Between {
+                id,
+                start,
+                bits,
+                more,
+            } => {
+                arrivals.push(good(*frame));
+                if frame.id() == id {
+                    let value = bytes::signed(frame, start, bits) + more;
+                    let lie = bytes::with_field(frame, start, bits, value);
+                    let ahead = [3, 6, 9, 12, 15, 16];
+                    let between = |by| good(bytes::with_counter(&lie, counter.wrapping_add(by)));
+                    arrivals.extend(ahead.map(between));
+                }
+            }
             Wire::Short => arrivals.push(bad(bytes::renamed(frame.id(), &frame.data()[..7]))),
             Wire::Renamed => arrivals.push(good(bytes::renamed(frame.id() ^ 0x400, frame.data()))),
             Wire::Burst(times) => {

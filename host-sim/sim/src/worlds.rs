@@ -86,6 +86,7 @@ enum Part {
     Slips,
     Works,
     LaneChanges,
+    Fades,
     NoYawRate,
 }
 
@@ -100,6 +101,8 @@ pub struct Happens {
     pub works: bool,
     /// A lane change by hand of which nobody is told.
     pub lane_changes: bool,
+    /// A yaw rate dies slowly, and a speed drifts.
+    pub fades: bool,
     /// No yaw rate is measured.
     pub no_yaw_rate: bool,
 }
@@ -107,7 +110,7 @@ pub struct Happens {
 use Part::{Assist, Bank, Blind, Braking, Camera, Friction, Gusts, Motor, Slippery, Steep, Wind};
 
 /// Every world, from paper to beyond.
-pub const WORLDS: [WorldKind; 19] = [
+pub const WORLDS: [WorldKind; 20] = [
     world("calibrated", "a calibrated car, flat road, no friction", &[]),
     world(
         "friction",
@@ -156,12 +159,12 @@ pub const WORLDS: [WorldKind; 19] = [
     ),
     more(
         "slips",
-        "everything, and wheels that lock for 30 to 250 ms, 6 times an hour",
+        "everything, and wheels that slip or spin by up to 5 m/s, in and out by ramps to 1 s, 6 times an hour",
         &[Part::Slips],
     ),
     more(
         "works",
-        "everything, and a line that jumps by 0.35 to 0.75 m and back, 3 times an hour",
+        "everything, and a line that jumps by 0.2 to 3.5 m and back, 3 times an hour",
         &[Part::Works],
     ),
     more(
@@ -169,11 +172,23 @@ pub const WORLDS: [WorldKind; 19] = [
         "everything, and lane changes by hand of which nobody is told, 22 an hour",
         &[Part::LaneChanges],
     ),
+    more(
+        "fades",
+        "everything, and a yaw rate that dies within 1 to 10 s beside a speed that drifts, 6 times an hour",
+        &[Part::Fades],
+    ),
     more("gusts", "everything, and gusts to 1 kN within 0.3 s", &[Gusts]),
     more(
         "events",
-        "everything, blinks, slips, works, lane changes and gusts together",
-        &[Gusts, Part::Blinks, Part::Slips, Part::Works, Part::LaneChanges],
+        "everything, blinks, slips, works, lane changes, fades and gusts together",
+        &[
+            Gusts,
+            Part::Blinks,
+            Part::Slips,
+            Part::Works,
+            Part::LaneChanges,
+            Part::Fades,
+        ],
     ),
     beyond(
         "no-yaw-rate",
@@ -236,6 +251,7 @@ impl WorldKind {
             slips: self.has(Part::Slips),
             works: self.has(Part::Works),
             lane_changes: self.has(Part::LaneChanges),
+            fades: self.has(Part::Fades),
             no_yaw_rate: self.has(Part::NoYawRate),
         }
     }

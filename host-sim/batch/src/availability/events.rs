@@ -10,11 +10,20 @@ use rand::{RngExt, SeedableRng};
 
 const STEPS_PER_HOUR: f64 = 3.6e6;
 const LANE_M: f64 = 3.5;
+/// A camera takes the next lane's line between the first wheel of a car 1.8 m wide on the marking and the last one off it.
+const TAKES_FROM_M: f64 = 0.85;
+const TAKES_TO_M: f64 = 2.65;
 /// How often in an hour.
 const BLINKS: f64 = 12.0;
 const SLIPS: f64 = 6.0;
 const WORKS: f64 = 3.0;
 const LANE_CHANGES: f64 = 22.0;
+const FADES: f64 = 6.0;
+/// Beyond this a line that stays is another lane, and a speed another vehicle's: the ECU ends guidance after some time, as it has to.
+const LASTING_LINE_M: f64 = 0.75;
+const LASTING_SLIP_M_PER_S: f64 = 1.9;
+/// How long the ECU rides out what is further, with some room.
+const RIDDEN_OUT_MS: f64 = 250.0;
 /// Before the first event the drive settles.
 const CALM_STEPS: u32 = 5000;
 
@@ -32,13 +41,59 @@ impl Span {
     }
 }
 
+/// What comes and goes by ramps.
+#[derive(Debug, Clone, Copy, Default)]
+struct Swell {
+    /// From the first step to the last.
+    span: Span,
+    into: f64,
+    out: f64,
+}
+
+impl Swell {
+    /// How much of it there is, 0 to 1.
+    fn share(&self, step: u32) -> f64 {
+        let Span { from, to, .. } = self.span;
+        if !self.span.has(step) {
+            return 0.0;
+        }
+        // A ramp of nothing is a step.
+        let rises = f64::from(step - from) / self.into.max(1.0);
+        let falls = f64::from(to - step) / self.out.max(1.0);
+        rises.min(falls).min(1.0)
+    }
+}
+
+/// Which source of the speed an event concerns.
+#[derive(Debug, Clone, Copy, Default)]
+enum Wheels {
+    #[default]
+    Both,
+    First,
+    Second,
+}
+
+impl Wheels {
+    fn of(self, by: f64) -> [f64; 2] {
+        match self {
+            Self::Both => [by; 2],
+            Self::First => [by, 0.0],
+            Self::Second => [0.0, by],
+        }
+    }
+}
+
 /// What happens, with the shipping ECU behind it.
 pub(super) struct Eventful {
     ecu: OverBus,
     happens: Happens,
     rng: Xoshiro256PlusPlus,
     blink: Span,
-    slip: Span,
+    slip: Swell,
+    slips: Wheels,
+    /// A yaw rate that dies, beside a speed that drifts.
+    fade: Swell,
+    drifts: Wheels,
     works: Span,
     /// The lane change on its way, and where the driver's line lies beside the first lane's, m to the right.
     change: Span,
@@ -47,6 +102,7 @@ pub(super) struct Eventful {
     /// Where the camera's line lies, and how far from its line it takes the next, m.
     camera_m: f64,
     takes_m: f64,
+    has_taken: bool,
 }
 
 impl Eventful {
@@ -56,13 +112,17 @@ impl Eventful {
             happens,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
             blink: Span::default(),
-            slip: Span::default(),
+            slip: Swell::default(),
+            slips: Wheels::default(),
+            fade: Swell::default(),
+            drifts: Wheels::default(),
             works: Span::default(),
             change: Span::default(),
             before_m: 0.0,
             after_m: 0.0,
             camera_m: 0.0,
             takes_m: 0.5 * LANE_M,
+            has_taken: true,
         }
     }
 
@@ -86,16 +146,26 @@ impl Eventful {
             slips,
             works,
             lane_changes,
+            fades,
             ..
         } = self.happens;
         if self.begins(step, blinks, BLINKS, self.blink) {
             self.blink = self.span(step, 40.0..800.0, 1.0..1.1);
         }
-        if self.begins(step, slips, SLIPS, self.slip) {
-            self.slip = self.span(step, 30.0..250.0, 3.0..5.0);
+        if self.begins(step, slips, SLIPS, self.slip.span) {
+            (self.slip, self.slips) = self.slip_at(step);
+        }
+        if self.begins(step, fades, FADES, self.fade.span) {
+            let (into, out) = (self.rng.random_range(1e3..10e3), self.rng.random_range(1e3..10e3));
+            let mut span = self.span(step, 10e3..60e3, 0.5..LASTING_SLIP_M_PER_S);
+            span.to += (into + out) as u32;
+            (self.fade, self.drifts) = (Swell { span, into, out }, self.wheels());
         }
         if self.begins(step, works, WORKS, self.works) {
-            self.works = self.span(step, 10e3..30e3, 0.35..0.75);
+            self.works = self.span(step, 10e3..30e3, 0.2..LANE_M);
+            if self.works.size.abs() > LASTING_LINE_M {
+                self.works.to = step + self.rng.random_range(50.0..900.0) as u32;
+            }
         }
         // Settled in the new lane before the next.
         let settled = Span {
@@ -110,8 +180,35 @@ impl Eventful {
             } else {
                 0.0
             };
-            self.takes_m = self.rng.random_range(1.3..1.9);
+            (self.takes_m, self.has_taken) = (self.rng.random_range(TAKES_FROM_M..TAKES_TO_M), false);
         }
+    }
+
+    /// A slip of both wheels or one: in and out by ramps of 0 to 1 s, often by none. One wheel that slips for long does so a little.
+    fn slip_at(&mut self, step: u32) -> (Swell, Wheels) {
+        let mut ramp = || {
+            let is_step = self.rng.random_bool(0.25);
+            if is_step {
+                0.0
+            } else {
+                self.rng.random_range(0.0..1e3)
+            }
+        };
+        let (into, out) = (ramp(), ramp());
+        let wheels = self.wheels();
+        let mut span = self.span(step, 30.0..250.0, 0.5..5.0);
+        let lasts = f64::from(span.to - step);
+        // For so long the two are 2 m/s apart.
+        let apart = (1.0 - 2.0 / span.size.abs()).max(0.0) * (into + out) + lasts;
+        if !matches!(wheels, Wheels::Both) && apart > RIDDEN_OUT_MS {
+            span.size = span.size.clamp(-LASTING_SLIP_M_PER_S, LASTING_SLIP_M_PER_S);
+        }
+        span.to += (into + out) as u32;
+        (Swell { span, into, out }, wheels)
+    }
+
+    fn wheels(&mut self) -> Wheels {
+        [Wheels::Both, Wheels::First, Wheels::Second][self.rng.random_range(0..3)]
     }
 
     /// Where the driver wants to be beside the first lane, m to the right: half a cosine from lane to lane.
@@ -132,9 +229,9 @@ impl Eventful {
         } else {
             self.after_m
         };
-        let (mine, other) = ((e_y_m - self.camera_m).abs(), (e_y_m - other_m).abs());
-        if mine > self.takes_m && other < LANE_M {
-            self.camera_m = other_m;
+        let mine = (e_y_m - self.camera_m).abs();
+        if !self.has_taken && mine > self.takes_m {
+            (self.camera_m, self.has_taken) = (other_m, true);
         }
         self.camera_m
     }
@@ -158,8 +255,12 @@ impl Guidance for Eventful {
         if self.blink.has(step) {
             seen.lane = None;
         }
-        if self.slip.has(step) {
-            seen.speed_m_per_s -= self.slip.size.abs();
+        let by = self.slip.share(step) * self.slip.span.size;
+        let drift = self.fade.share(step) * self.fade.span.size;
+        let ([a, b], [c, d]) = (self.slips.of(by), self.drifts.of(drift));
+        self.ecu.slip([a + c, b + d]);
+        if let Some(rate) = &mut seen.yaw_rate_rad_per_s {
+            *rate *= 1.0 - self.fade.share(step);
         }
         if self.happens.no_yaw_rate {
             seen.yaw_rate_rad_per_s = None;

@@ -45,7 +45,8 @@ pub(super) const ROWS: &[FaultCase] = rows! {
         [wire(Wire::Masquerade)] .rejected().q();
     "wrong-length" "frames of seven bytes" [wire(Wire::Short)] .hands_over(STALE_MS).q();
     "wrong-identifier" "frames under an unknown identifier" [wire(Wire::Renamed)] .hands_over(STALE_MS).q();
-    "ten-times-the-rate" "ten frames where one is due, counters running" [wire(Wire::Burst(10))] .q();
+    "ten-times-the-rate" "ten frames where one is due, counters running: no sender counts so fast"
+        [wire(Wire::Burst(10))] .hands_over(STALE_MS).q();
     "jitter" "frames up to 25 ms late, in order: a gap may pass the time-out"
         [wire(Wire::Jittered(25))] .bridged().may_hand_over_at_once().q();
     "request-toggles" "request toggles at 50 Hz" [Injection::Request(RequestFault::Toggles)] .fades(22).q();

@@ -38,6 +38,8 @@ pub struct OverBus {
     applied: Actuation,
     display: ReceiverState,
     status: Status,
+    /// What each wheel speed is more than the vehicle's, m/s.
+    slips_m_per_s: [f64; 2],
 }
 
 impl OverBus {
@@ -52,7 +54,14 @@ impl OverBus {
             applied: Actuation::default(),
             display: ReceiverState::TRUSTED,
             status: Status::GUIDES,
+            slips_m_per_s: [0.0; 2],
         }
+    }
+
+    /// Makes the two speeds on the bus differ from the vehicle's by so much, m/s, until the next call: wheels that slip, or a
+    /// source that drifts. They are no less than zero.
+    pub fn slip(&mut self, slips_m_per_s: [f64; 2]) {
+        self.slips_m_per_s = slips_m_per_s;
     }
 
     /// The frames that the senders put on the bus in this step.
@@ -81,8 +90,9 @@ impl OverBus {
         }
         if observation.step.is_multiple_of(HOST_PERIOD_STEPS) {
             let counter = (observation.step / HOST_PERIOD_STEPS) as u8;
+            let speed = |slip_m_per_s: f64| (observation.speed_m_per_s + slip_m_per_s).max(0.0);
             let vehicle = Vehicle {
-                speeds: [Speed::from_m_per_s(observation.speed_m_per_s); 2],
+                speeds: self.slips_m_per_s.map(|slip| Speed::from_m_per_s(speed(slip))),
                 yaw_rate: observation.yaw_rate_rad_per_s.map(TurningRate::from_rad_per_s),
             };
             let _ = self.sent.push(vehicle.encode(counter));
