@@ -378,7 +378,6 @@ const LONGER: &[(&str, &str)] = &[
     ("core/src/controller/mod.rs", "what the controller reads, decides and remembers, beside each other"),
     ("core/src/controller/step.rs", "one step of the controller, read from top to bottom"),
     ("core/src/ecu/receivers.rs", "what each message has to pass before it is used, beside the others"),
-    ("core/src/safety/plausibility.rs", "the checks, with the sums that they keep"),
     ("core/src/safety/monitor.rs", "the second computation, which stands by itself"),
     ("core/src/ecu/mod.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),

@@ -11,15 +11,28 @@ use crate::tool::{self, cargo, run};
 
 /// Every file of the core, what decides or guards a torque first, with the tests that must notice a defect in it beside its
 /// own unit tests. What cannot be noticed is in `.cargo/mutants.toml`, with its reason.
-const MUTATED: [(&str, &[&str]); 37] = [
+const MUTATED: [(&str, &[&str]); 41] = [
     ("safety/envelope.rs", &["envelope"]),
     ("safety/modes.rs", &["modes"]),
     ("bus/e2e.rs", &["e2e", "edges", "dbc"]),
     ("safety/monitor.rs", &["monitor", "probe"]),
     (
-        "safety/plausibility.rs",
-        &["plausibility", "column", "road", "edges", "ecu"],
+        "safety/plausibility/column.rs",
+        &["plausibility", "column", "edges", "ecu"],
     ),
+    (
+        "safety/plausibility/lane.rs",
+        &["plausibility", "road", "edges", "ecu"],
+    ),
+    (
+        "safety/plausibility/motion.rs",
+        &["plausibility", "column", "road", "ecu"],
+    ),
+    (
+        "safety/plausibility/steps.rs",
+        &["plausibility", "road", "edges", "ecu"],
+    ),
+    ("safety/plausibility/mod.rs", &["plausibility"]),
     (
         "controller/mod.rs",
         &["ecu", "probe", "edges", "endurance", "memory", "road"],
