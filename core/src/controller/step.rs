@@ -306,9 +306,13 @@ impl<I: Injection> Step<'_, I> {
             changed.add(ChangedParts::COLUMN);
             let is_tested = v.fast.packed.mode == STANDBY || v.fast.probe != ProbeState::SILENT;
             let passed = v.plausibility.since_column(self.now);
-            let is_alive = pending
-                .frozen_torque
-                .is_alive(c.driver_torque, c.wheel_angle, passed, is_tested);
+            let is_alive = pending.frozen_torque.is_alive(
+                c.driver_torque,
+                c.wheel_angle,
+                v.plausibility.speed(),
+                passed,
+                is_tested,
+            );
             let plausible = checks.column(
                 &mut v.plausibility,
                 self.now,

@@ -304,7 +304,7 @@ pub(crate) struct Still {
 }
 
 impl Still {
-    pub(crate) fn is_alive(&mut self, torque: f64, wheel: f64, passed: i64, is_tested: bool) -> bool {
+    pub(crate) fn is_alive(&mut self, torque: f64, wheel: f64, v: f64, passed: i64, is_tested: bool) -> bool {
         if torque != self.torque {
             *self = Self {
                 torque,
@@ -323,7 +323,12 @@ impl Still {
         }
         self.lasted += passed;
         self.wheels = [self.wheels[0].min(wheel), self.wheels[1].max(wheel)];
-        let most = if is_tested { 0.0087 } else { 0.14 };
+        // 8 deg from 40 km/h on, below it so far that the lateral acceleration is as large.
+        let most = if is_tested {
+            0.0087
+        } else {
+            0.14 * (40.0 / 3.6 / v).powi(2).max(1.0)
+        };
         self.is_found = self.lasted >= 1_000_000 && exceeds(self.wheels[1] - self.wheels[0], most);
         !self.is_found
     }

@@ -397,7 +397,7 @@ impl Reference {
             let passed = self.checks.since_column(now);
             let is_alive = self
                 .still
-                .is_alive(column.driver, column.wheel, passed, is_tested);
+                .is_alive(column.driver, column.wheel, self.checks.v, passed, is_tested);
             let belongs = self
                 .checks
                 .column(&self.c, now, column.driver, column.wheel, self.applied);
