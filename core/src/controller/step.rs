@@ -151,13 +151,17 @@ impl<I: Injection> Step<'_, I> {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
-                match v.coast.picture_arrived(&sample, agrees, demanded) {
+                let checks = &self.config.plausibility;
+                let follows = checks.other_line_follows(&v.plausibility, motion_history, self.now);
+                match v.coast.picture_arrived(&sample, [agrees, follows], demanded) {
                     // From the extrapolated line to the picture is a jump, and no rate.
-                    PictureVerdict::Returned => v.law.relocate(sample),
+                    PictureVerdict::Returned => {
+                        v.law.relocate(sample);
+                        v.plausibility.forget_other_line();
+                    }
                     PictureVerdict::Adopted => {
                         v.law = LawState::NEW;
-                        v.plausibility.forget_lane();
-                        motion_history.forget_line();
+                        v.plausibility.adopt_other_line(motion_history);
                     }
                     PictureVerdict::Expected | PictureVerdict::Elsewhere => {}
                 }
@@ -166,7 +170,8 @@ impl<I: Injection> Step<'_, I> {
             }
             _ => {}
         }
-        v.coast.advance(self.elapsed);
+        let is_line_doubted = v.plausibility.is_line_doubted();
+        v.coast.advance(self.elapsed, is_line_doubted);
         let mut reported = FaultSet::NONE;
         reported.insert_if(v.coast.sees_other_line(), Fault::LaneStep);
         if !v.coast.is_extrapolating() {
@@ -324,18 +329,22 @@ impl<I: Injection> Step<'_, I> {
         }
         if let Some(sample) = to_check(&self.lane, &mut pending.lane) {
             changed.add(ChangedParts::LANE);
-            if v.coast.is_extrapolating() {
-                // No picture, so nothing to compare.
-                v.plausibility
-                    .accept_extrapolation(motion_history, self.now, sample);
+            let (state, now) = (&mut v.plausibility, self.now);
+            let moved = if v.coast.is_extrapolating() {
+                state.accept_extrapolation(motion_history, now, sample);
+                // Pictures of another line are compared with themselves; where none comes, nothing is.
+                let picture = self.inputs.lane.value().filter(|_| v.coast.sees_other_line());
+                picture.map(|picture| checks.other_lane(state, motion_history, now, picture))
             } else {
-                let moved = checks.lane(&mut v.plausibility, motion_history, self.now, sample);
+                Some(checks.lane(state, motion_history, now, sample))
+            };
+            if let Some(moved) = moved {
                 kept.set(moved == LaneMotion::Inconsistent, Fault::LaneImplausible);
-                if moved == LaneMotion::ContradictsYawRate {
-                    changed.add(ChangedParts::MOTION);
-                    v.plausibility.distrust_yaw_rate();
-                    kept.insert(Fault::YawRate);
-                }
+            }
+            if moved == Some(LaneMotion::ContradictsYawRate) {
+                changed.add(ChangedParts::MOTION);
+                v.plausibility.distrust_yaw_rate();
+                kept.insert(Fault::YawRate);
             }
             if self.config.plausibility.between.least_share().is_some() {
                 pending.lane |= self.look_at_activity(v, &mut pending.activity);

@@ -15,7 +15,7 @@ mod receivers;
 mod torque;
 
 use checks::{Checks, MotionHistory, Moved, Still};
-use coast::Coast;
+use coast::{Coast, Sight};
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::controller::inputs::Input;
 use haptic_core::controller::params::Params;
@@ -405,11 +405,16 @@ impl Reference {
         }
         let is_new = matches!(lane, Input::New(_));
         if let (true, Some(lane)) = (is_due(is_new, &mut self.pending[0]), lane.value()) {
-            if self.coast.goes_on() {
+            let moved = if self.coast.goes_on() {
                 self.checks.went_on(&mut self.history, lane);
-                return;
-            }
-            let moved = self.checks.lane(&self.c, &mut self.history, lane);
+                let picture = seen.lane.value();
+                let Some(picture) = picture.filter(|_| self.coast.sight == Sight::Apart) else {
+                    return;
+                };
+                self.checks.other_lane(&self.c, &mut self.history, picture)
+            } else {
+                self.checks.lane(&self.c, &mut self.history, lane)
+            };
             self.kept
                 .set(moved == Moved::Inconsistent, Fault::LaneImplausible);
             if moved == Moved::ContradictsYawRate {

@@ -21,9 +21,11 @@
 
 use fixed::types::I8F24;
 
-use super::{Plausibility, PlausibilityState};
+use super::{Plausibility, PlausibilityState, lane_step_is_possible};
 use crate::law::LaneSample;
-use crate::quantity::{Instant, Metres, Radians, Speed, leak, per_second, product, product_below, saturate};
+use crate::quantity::{
+    Instant, Metres, Radians, Speed, TurningRate, leak, per_second, product, product_below, saturate,
+};
 use crate::safety::motion_history::MotionHistory;
 use crate::safety::redundant::words;
 use crate::safety::yaw::BIAS_SHIFT;
@@ -35,6 +37,9 @@ pub const UNREAL: Metres = Metres::from_m(0.8);
 /// The margins where the prediction comes from wheel angle and speed.
 const LANE_MARGIN_BY_WHEEL: Metres = Metres::from_m(1.0);
 const UNREAL_BY_WHEEL: Metres = Metres::from_m(2.0);
+/// A line that was adopted is doubted until this much movement was predicted of it, or the vehicle turned its near point by as
+/// much, within a second, and no more than a quarter of that is missing.
+const SHOWS: Metres = Metres::from_m(0.2);
 /// Bounds of the long-run error of the lane's prediction. With a yaw rate: 5 mrad of camera mounting at 30 m/s; by
 /// wheel angle and speed: 1.5 deg of wheel offset and a bank of 5 %.
 pub const LANE_BIAS: Speed = Speed::from_m_per_s(0.15);
@@ -52,6 +57,13 @@ words! {
         pub(super) seen: Metres,
         /// The long-run error of the prediction, which corrects it.
         pub(super) bias: Speed,
+        /// Another line that pictures show: whether there is one, and its last sample.
+        pub(super) other_is_known: u32,
+        pub(super) other: LaneSample,
+        /// 1 since another line was adopted, until it moved as the vehicle does; and how far the vehicle turned the near
+        /// point meanwhile, summed as the movements are.
+        pub(super) is_doubted: u32,
+        pub(super) turned: Metres,
     }
 }
 
@@ -67,7 +79,20 @@ impl LaneState {
         predicted: Metres::ZERO,
         seen: Metres::ZERO,
         bias: Speed::ZERO,
+        other_is_known: 0,
+        other: LaneSample {
+            e_y: Metres::ZERO,
+            e_theta: Radians::ZERO,
+            at: Instant::from_us(0),
+        },
+        is_doubted: 0,
+        turned: Metres::ZERO,
     };
+
+    fn swap_lines(&mut self) {
+        core::mem::swap(&mut self.last, &mut self.other);
+        core::mem::swap(&mut self.is_known, &mut self.other_is_known);
+    }
 }
 
 /// How the near-point error moved.
@@ -107,10 +132,72 @@ impl PlausibilityState {
     /// Forgets the lane, which was lost: the next sample is compared with nothing.
     pub fn forget_lane(&mut self) {
         (self.lane.is_known, self.lane.predicted, self.lane.seen) = (0, Metres::ZERO, Metres::ZERO);
+        (self.lane.other_is_known, self.lane.is_doubted) = (0, 0);
+    }
+
+    /// Forgets the other line: pictures agree with the one that is followed.
+    pub(crate) fn forget_other_line(&mut self) {
+        self.lane.other_is_known = 0;
+    }
+
+    /// Follows the other line, which is doubted until it has moved as the vehicle does. What was summed up is kept: a line
+    /// that lied before it jumped has not become another camera's.
+    pub(crate) fn adopt_other_line(&mut self, motion_history: &mut MotionHistory) {
+        motion_history.swap_lines();
+        self.lane.swap_lines();
+        (self.lane.other_is_known, self.lane.is_doubted, self.lane.turned) = (0, 1, Metres::ZERO);
+    }
+
+    /// Whether the line has not yet moved as the vehicle does since it was adopted.
+    pub(crate) const fn is_line_doubted(&self) -> bool {
+        self.lane.is_doubted != 0
     }
 }
 
 impl Plausibility {
+    /// Takes a sample of another line, whose movements are summed with those of the line before it.
+    #[must_use]
+    pub(crate) fn other_lane(
+        &self,
+        state: &mut PlausibilityState,
+        motion_history: &mut MotionHistory,
+        now: Instant,
+        sample: LaneSample,
+    ) -> LaneMotion {
+        motion_history.swap_lines();
+        state.lane.swap_lines();
+        // It may have jumped where no picture came.
+        if state.lane.is_known == 0 || !lane_step_is_possible(&state.lane.last, &sample) {
+            state.lane.is_known = 0;
+            motion_history.forget_line();
+        }
+        let moved = self.lane(state, motion_history, now, sample);
+        motion_history.swap_lines();
+        state.lane.swap_lines();
+        moved
+    }
+
+    /// Whether the other line has been watched for long enough to be compared with the vehicle's movement, and used no more
+    /// than half of the margin.
+    #[must_use]
+    pub(crate) fn other_line_follows(
+        &self,
+        state: &PlausibilityState,
+        motion_history: &mut MotionHistory,
+        now: Instant,
+    ) -> bool {
+        motion_history.swap_lines();
+        let known = motion_history.line_direction(now, state.lane.other.at, self.between.time());
+        motion_history.swap_lines();
+        let margin = if state.motion.has_yaw_rate != 0 {
+            LANE_MARGIN
+        } else {
+            LANE_MARGIN_BY_WHEEL
+        };
+        let is_known = state.lane.other_is_known != 0 && known.is_some();
+        is_known && state.missing().abs().fixed() <= margin.fixed().wrapping_shr(1)
+    }
+
     /// Takes a lane sample that arrived in this step, and says whether its error moved as predicted. Not inlined, for
     /// the reason given at [`Self::column`].
     #[must_use]
@@ -125,10 +212,15 @@ impl Plausibility {
         motion_history.record_line(now, sample.at, sample.e_theta);
         let measured = state.motion.has_yaw_rate != 0;
         // Predicted from wheel angle and speed, a movement may be missing because of a bank, a gust or a tyre.
-        let (margin, unreal, most) = if measured {
+        let (margin, unreal, most_bias) = if measured {
             (LANE_MARGIN, UNREAL, LANE_BIAS)
         } else {
             (LANE_MARGIN_BY_WHEEL, UNREAL_BY_WHEEL, LANE_BIAS_BY_WHEEL)
+        };
+        let unreal = if state.lane.is_doubted != 0 {
+            Metres::from_fixed(unreal.fixed().wrapping_shr(1))
+        } else {
+            unreal
         };
         let dt = sample.at.since(state.lane.last.at);
         if state.lane.is_known != 0 && dt.us() != 0 {
@@ -139,16 +231,25 @@ impl Plausibility {
             let bias = state.lane.bias.fixed();
             let predicted = predicted.saturating_add(per_second(bias, dt));
             let learnt = seen.saturating_sub(predicted).wrapping_shr(BIAS_SHIFT);
-            state.lane.bias = Speed::from_fixed(bias.saturating_add(learnt)).within(most);
+            state.lane.bias = Speed::from_fixed(bias.saturating_add(learnt)).within(most_bias);
             let summed = |sum: Metres, change: I8F24| Metres::from_fixed(leak(sum.fixed(), change, dt));
             state.lane.predicted = summed(state.lane.predicted, predicted);
             state.lane.seen = summed(state.lane.seen, seen);
             state.lane.is_alive = u32::from(seen != I8F24::ZERO || sample.e_theta != state.lane.last.e_theta);
+            if state.lane.is_doubted != 0 {
+                let turned = self.turning_rate(state, motion_history.heading(now, sample.at).rate);
+                state.lane.turned = summed(state.lane.turned, per_second(turned, dt));
+            }
         }
         (state.lane.is_known, state.lane.last) = (1, sample);
         // A missing movement counts only if more than half the margin was predicted. A movement that was not
         // predicted proves a fault only where it is larger than any vehicle's.
         let (predicted, missing) = (state.lane.predicted, state.missing());
+        if state.lane.is_doubted != 0 {
+            let moved = predicted.abs().max(state.lane.turned.abs());
+            let follows = missing.abs().fixed() <= moved.fixed().wrapping_shr(2);
+            state.lane.is_doubted = u32::from(moved < SHOWS || !follows);
+        }
         let is_missing = missing > margin && predicted.abs().fixed() > margin.fixed().wrapping_shr(1);
         if !is_missing && missing.abs() <= unreal {
             return LaneMotion::Consistent;
@@ -183,8 +284,13 @@ impl Plausibility {
         let near = motion_history.line_direction(now, at, self.between.time())?;
         let turning = motion_history.heading(now, at).rate;
         let along = saturate(product(state.motion.speed.fixed(), near.fixed()));
+        Some(along.saturating_sub(self.turning_rate(state, turning)))
+    }
+
+    /// The rate at which a yaw rate moves the near point aside, m/s.
+    fn turning_rate(&self, state: &PlausibilityState, turning: TurningRate) -> I8F24 {
         let reach = saturate(product(self.near_time.fixed(), state.motion.speed.fixed()));
-        Some(along.saturating_sub(product_below(reach, turning.fixed())))
+        product_below(reach, turning.fixed())
     }
 
     /// The same rate where the line's direction is not known: it is assumed to bend as the vehicle turns.
