@@ -56,6 +56,24 @@ fn a_blink_takes_some_trust_and_brings_it_back() {
     }
 }
 
+/// A tenth of the torque is gone after 0.2 s without a picture in use: from then on the driver is warned, and no longer than it lasts.
+/// The last picture is used for 22 to 30 ms, and three frames are needed.
+#[test]
+fn a_camera_that_is_silent_for_long_warns() {
+    for (blind_ms, warned_ms) in [(100, 0), (190, 0), (300, 90), (900, 690)] {
+        let mut rig = beside(0.2);
+        rig.silent[LANE] = true;
+        let mut warned = 0;
+        for ms in 0..blind_ms + 100 {
+            rig.silent[LANE] = ms < blind_ms;
+            let step = rig.tick();
+            assert_eq!(step.command.mode, Mode::Active);
+            warned += u32::from(step.command.warning);
+        }
+        assert!(u32::abs_diff(warned, warned_ms) <= 12, "{blind_ms} ms: {warned}");
+    }
+}
+
 /// A loss is declared after a second, and pictures make up for it half as fast: every second 0.4 s of none never end
 /// guidance, 0.6 s do within 4.
 #[test]

@@ -7,8 +7,8 @@
 //!
 //! | what comes | trust | for at most |
 //! |---|---|---|
-//! | no picture | falls by 0.5 a second | 1 s, of which half as much is forgiven while pictures agree |
-//! | pictures of a line elsewhere | falls by 2 a second | 4 s; the new line is taken when there is no trust left, it is near, and it has moved as the vehicle does |
+//! | no picture; a warning after 0.2 s | falls by 0.5 a second | 1 s, of which half as much is forgiven while pictures agree |
+//! | pictures of a line elsewhere, with a warning | falls by 2 a second | 4 s; the new line is taken when there is no trust left, it is near, and it has moved as the vehicle does |
 //! | pictures that agree | rises by 1 a second, to a half only while a line that was taken has shown no movement | |
 //!
 //! If it lasts longer, the input is lost, as outside Active. So a loss is declared a second later than outside
@@ -22,6 +22,8 @@ use crate::safety::redundant::words;
 
 /// After this time without a picture the lane is lost.
 pub const MOST_BLIND: Micros = Micros::from_ms(1000);
+/// After this time without a picture the driver is warned: a tenth of the torque is gone, and most blinks are over.
+const WARN_BLIND: Micros = Micros::from_ms(200);
 /// After this time with pictures of a line elsewhere the lane is lost. A lane change by hand at 0.35 m/s comes near
 /// the new line sooner.
 const MOST_APART: Micros = Micros::from_ms(4000);
@@ -105,6 +107,11 @@ impl Coast {
     /// Whether pictures show a line elsewhere.
     pub(crate) const fn sees_other_line(&self) -> bool {
         self.sight == APART
+    }
+
+    /// Whether no picture has come for so long that the driver has to know.
+    pub(crate) fn is_long_blind(&self) -> bool {
+        self.sight == BLIND && self.lost >= WARN_BLIND
     }
 
     /// The law's torque for the extrapolated lane, limited by [`AWAY_PER_US`].

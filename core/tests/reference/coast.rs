@@ -35,6 +35,10 @@ impl Coast {
         self.sight == Sight::Sees && self.trust == 1.0 && self.blind == 0
     }
 
+    pub(super) fn is_long_blind(&self) -> bool {
+        self.sight == Sight::Blind && self.lost >= 200_000
+    }
+
     pub(super) fn goes_on(&self) -> bool {
         let is_short = match self.sight {
             Sight::Sees => false,

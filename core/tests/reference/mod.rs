@@ -305,7 +305,8 @@ impl Reference {
             self.outputs[1].push(now, kept);
         }
         let warning = matches!(self.mode, Mode::Handover | Mode::Fault | Mode::Locked)
-            || (self.mode == Mode::Active && faults.contains(Fault::LaneStep))
+            || (self.mode == Mode::Active
+                && (faults.contains(Fault::LaneStep) || self.coast.is_long_blind()))
             || faults.contains(Fault::HandsOff);
         Said {
             torque,
