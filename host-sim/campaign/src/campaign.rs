@@ -207,6 +207,7 @@ pub(super) fn result(
         None => {
             let at_ms = outcome.onset_ms + outcome.left_after_ms.unwrap_or_default();
             let further = too_far(&outcome.deviation).filter(|_| row.obeys());
+            let limits = row.limits(limits);
             let beyond = || beyond(&outcome.deviation, limits).filter(|_| row.is_limited());
             Some(failed(
                 outcome,
@@ -226,6 +227,7 @@ pub(super) fn result(
     let noticed_after_ms = sorted_ms(|o| o.noticed_after_ms);
     let mut deviations_m: Vec<f64> = outcomes.iter().map(|o| o.deviation.faulted_m).collect();
     deviations_m.sort_unstable_by(f64::total_cmp);
+    let limits = row.limits(limits);
     let share = |count: usize| wilson(count as f64 / outcomes.len() as f64, outcomes.len() as f64);
     let left_lane = outcomes.iter().filter(|o| o.deviation.leaves_lane).count();
     CaseResult {
@@ -269,6 +271,12 @@ fn quantile<T: Copy>(sorted: &[T], percent: usize) -> Option<T> {
 
 /// What is wrong with a deviation by itself.
 fn beyond(deviation: &Deviation, limits: Limits) -> Option<String> {
+    let pushed = deviation.pushed_m.zip(limits.pushed_m);
+    if let Some((pushed_m, most_m)) = pushed.filter(|(pushed_m, most_m)| pushed_m > most_m) {
+        return Some(format!(
+            "a false torque pushed the vehicle {pushed_m:.2} m aside, {most_m:.2} m are allowed with these drivers"
+        ));
+    }
     (deviation.faulted_m > limits.deviation_m && !deviation.is_off_road()).then(|| {
         format!(
             "the vehicle went {:.2} m aside, {:.2} m are allowed with these drivers",
