@@ -393,7 +393,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
     ("core/src/ecu/receivers.rs", "what each message has to pass before it is used, beside the others"),
-    ("core/src/safety/plausibility.rs", "the checks, with the sums that they keep"),
     ("core/src/safety/monitor.rs", "the second computation, which stands by itself"),
     ("core/src/ecu/mod.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),

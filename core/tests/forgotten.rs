@@ -45,35 +45,61 @@ fn a_line_after_a_loss_has_no_direction_of_the_one_before() {
     }
 }
 
-/// Guided, from one line to another, up to the step in which the other is taken.
-fn taken(from_m: f64, to_m: f64, e_theta: f64) -> Rig {
+/// Guided, from one line to another, up to the step in which the other is taken. That one runs at an angle to the vehicle, and is
+/// at `to_m` 0.6 s after the jump; where it is in the end.
+fn taken(from_m: f64, to_m: f64, e_theta: f64) -> (Rig, f64) {
     let mut rig = straight(from_m);
     rig.engage = true;
     assert_eq!(rig.run(1500).command.mode, Mode::Active);
-    (rig.lane.e_y, rig.lane.e_theta) = (Metres::from_m(to_m), Radians::from_rad(e_theta));
-    rig.run_until(100, |step| step.command.faults.contains(Fault::LaneStep));
-    rig.run_until(600, |step| !step.command.faults.contains(Fault::LaneStep));
-    rig
+    rig.lane.e_theta = Radians::from_rad(e_theta);
+    let mut was_apart = false;
+    for ms in 0..800 {
+        let e_y = to_m + SPEED * e_theta * (f64::from(ms) * 1e-3 - 0.6);
+        rig.lane.e_y = Metres::from_m(e_y);
+        let step = rig.tick();
+        assert_eq!(
+            step.command.mode,
+            Mode::Active,
+            "{ms} ms: {:?}",
+            step.command.faults
+        );
+        let is_apart = step.command.faults.contains(Fault::LaneStep);
+        if was_apart && !is_apart {
+            return (rig, e_y);
+        }
+        was_apart = is_apart;
+    }
+    panic!("it is not taken");
 }
 
+/// 3.2 m/s of a line that runs at 0.19 rad: the old line's direction would predict none of it.
 #[test]
 fn a_new_line_has_no_direction_of_the_old_one() {
     for sign in [1.0, -1.0] {
-        let mut rig = taken(0.0, -0.75 * sign, 0.19 * sign);
-        runs_on(&mut rig, -0.75 * sign, 0.19 * sign);
+        let (mut rig, e_y) = taken(0.0, -0.75 * sign, 0.19 * sign);
+        runs_on(&mut rig, e_y, 0.19 * sign);
         assert_eq!(rig.tick().command.mode, Mode::Active);
     }
 }
 
-/// A metre of the new line's drift is less than the 0.8 m, in a second, that no measured yaw rate explains away; the 2.7 m to
-/// the new line were no drift.
+/// The 2.7 m to a new line were no drift of it. What it drifts then may be 0.4 m, beyond the prediction and in a second, while it has
+/// shown no movement that the vehicle made: 0.7 m/s are not so much within 0.5 s, and 1.5 m/s are after ln(1.5/1.1) = 0.31 s.
 #[test]
 fn the_way_to_a_new_line_is_no_movement_of_it() {
-    let mut rig = taken(2.0, -0.7, 0.0);
-    rig.run(450);
-    for ms in 0..500 {
-        rig.lane.e_y = Metres::from_m(-0.7 + 1.5e-3 * f64::from(ms));
-        assert_eq!(rig.tick().command.mode, Mode::Active, "{ms} ms");
+    for (m_per_s, found_ms) in [(0.7, None), (1.5, Some(310))] {
+        let (mut rig, e_y) = taken(2.0, -0.7, 0.0);
+        rig.run(450);
+        let found = (0..500).find(|ms| {
+            rig.lane.e_y = Metres::from_m(e_y + m_per_s * 1e-3 * f64::from(*ms));
+            rig.tick().command.mode != Mode::Active
+        });
+        let is_close = found
+            .zip(found_ms)
+            .is_some_and(|(ms, by_hand): (i32, i32)| (ms - by_hand).abs() <= 20);
+        assert!(
+            found.is_none() && found_ms.is_none() || is_close,
+            "{m_per_s}: {found:?}"
+        );
     }
 }
 
@@ -215,18 +241,21 @@ fn speeds_that_agree_again_are_plausible() {
     assert_eq!(rig.run(50).command.mode, Mode::Active);
 }
 
-/// 0.25 rad beside the vehicle's direction is no lane that it keeps to, however near.
+/// 0.25 rad beside the vehicle's direction is no lane that it keeps to, however near: at 60 km/h it is within 0.8 m for 0.38 s, half a
+/// second after the jump.
 #[test]
 fn a_line_across_the_way_is_not_taken() {
     for sign in [1.0, -1.0] {
         let mut rig = straight(0.0);
         rig.engage = true;
         rig.run(1500);
-        (rig.lane.e_y, rig.lane.e_theta) = (Metres::from_m(0.4), Radians::from_rad(0.25 * sign));
-        rig.run(600);
-        for _ in 0..3000 {
+        rig.lane.e_theta = Radians::from_rad(0.25 * sign);
+        for ms in 0..1400 {
+            rig.lane.e_y = Metres::from_m(sign * 0.25 * SPEED * (f64::from(ms) * 1e-3 - 0.75));
             let step = rig.tick();
-            assert!(step.command.faults.contains(Fault::LaneStep) && rig.applied == 0.0);
+            assert_eq!(step.command.mode, Mode::Active, "{:?}", step.command.faults);
+            assert!(ms < 60 || step.command.faults.contains(Fault::LaneStep));
+            assert!(ms < 600 || rig.applied == 0.0);
         }
     }
 }
@@ -260,13 +289,12 @@ fn what_a_blind_guidance_asks_for_stays_near_the_last_picture() {
     }
 }
 
-/// A line that was taken a moment ago, before the 0.4 s after which its course is known, goes on at speed times angle: 0.4 m
-/// in the time without a picture.
+/// A line that was taken a moment ago was watched before: it goes on at speed times angle, 0.33 m in the time without a picture.
 #[test]
-fn a_new_line_goes_on_before_its_course_is_known() {
-    let mut rig = taken(0.0, -0.7, 0.1);
+fn a_new_line_goes_on_without_pictures() {
+    let (mut rig, e_y) = taken(0.0, -0.7, 0.1);
     for ms in 0..450 {
-        rig.lane.e_y = Metres::from_m(-0.7 + 0.1 * SPEED * f64::from(ms) * 1e-3);
+        rig.lane.e_y = Metres::from_m(e_y + 0.1 * SPEED * f64::from(ms) * 1e-3);
         rig.silent[LANE] = (150..350).contains(&ms);
         let step = rig.tick();
         assert!(!step.command.faults.contains(Fault::LaneStep), "{ms} ms");
@@ -430,7 +458,7 @@ fn a_motor_that_is_strong_again_is_no_weak_one() {
 #[test]
 fn a_new_line_is_trusted_from_nothing_on() {
     for sign in [1.0, -1.0] {
-        let mut rig = taken(0.0, 0.75 * sign, 0.0);
+        let (mut rig, _) = taken(0.0, 0.75 * sign, 0.0);
         rig.run(300);
         let expected = 0.3 * 0.375 * sign;
         assert!(

@@ -92,3 +92,24 @@ fn what_no_vehicle_has_is_left_out_and_then_not_believed() {
         }
     }
 }
+
+/// A yaw rate that grows by 0.1 rad/s in each message steps over nothing: it is left out from 12 m/s2 aside on, 0.72 rad/s at 60 km/h.
+/// The wheel follows, so that nothing else denies it.
+#[test]
+fn twelve_m_per_s2_aside_are_the_most() {
+    for sign in [1.0, -1.0] {
+        for (rate, is_declared) in [(0.7, false), (0.75, true)] {
+            let mut rig = in_bend(0.0);
+            for step in 1..=8 {
+                rig.turn(sign * f64::min(0.1 * f64::from(step), rate));
+                rig.run(10);
+            }
+            let step = rig.run(130);
+            assert_eq!(
+                step.command.faults.contains(Fault::YawRate),
+                is_declared,
+                "{rate}"
+            );
+        }
+    }
+}

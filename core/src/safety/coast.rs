@@ -7,9 +7,9 @@
 //!
 //! | what comes | trust | for at most |
 //! |---|---|---|
-//! | no picture | falls by 0.5 a second | 1 s, of which half as much is forgiven while pictures agree |
-//! | pictures of a line elsewhere | falls by 2 a second | 4 s; the new line is taken when there is no trust left and it is near |
-//! | pictures that agree | rises by 1 a second | |
+//! | no picture; a warning after 0.2 s | falls by 0.5 a second | 1 s, of which half as much is forgiven while pictures agree |
+//! | pictures of a line elsewhere, with a warning | falls by 2 a second | 4 s; the new line is taken when there is no trust left, it is near, and it has moved as the vehicle does |
+//! | pictures that agree | rises by 1 a second, to a half only while a line that was taken has shown no movement | |
 //!
 //! If it lasts longer, the input is lost, as outside Active. So a loss is declared a second later than outside
 //! Active; meanwhile the torque follows the road and falls as fast as in a handover (docs/decisions/012).
@@ -22,6 +22,8 @@ use crate::safety::redundant::words;
 
 /// After this time without a picture the lane is lost.
 pub const MOST_BLIND: Micros = Micros::from_ms(1000);
+/// After this time without a picture the driver is warned: a tenth of the torque is gone, and most blinks are over.
+const WARN_BLIND: Micros = Micros::from_ms(200);
 /// After this time with pictures of a line elsewhere the lane is lost. A lane change by hand at 0.35 m/s comes near
 /// the new line sooner.
 const MOST_APART: Micros = Micros::from_ms(4000);
@@ -36,6 +38,9 @@ pub const BLIND_FALL: Ratio = Ratio::from_si(-0.5);
 /// pictures that agree.
 const APART_FALL: Ratio = Ratio::from_si(-2.0);
 const RISE: Ratio = Ratio::ONE;
+
+/// Most trust in a line that was adopted, until it has moved as the vehicle does.
+const BELIEVED: Ratio = Ratio::from_si(0.5);
 
 /// The torque for the extrapolated lane may depart from the torque for the last picture at this rate, in 2^-24 N.m
 /// per microsecond. It is slightly less than 1 N.m/s, the rate at which the monitor's band grows, so that the monitor
@@ -104,6 +109,11 @@ impl Coast {
         self.sight == APART
     }
 
+    /// Whether no picture has come for so long that the driver has to know.
+    pub(crate) fn is_long_blind(&self) -> bool {
+        self.sight == BLIND && self.lost >= WARN_BLIND
+    }
+
     /// The law's torque for the extrapolated lane, limited by [`AWAY_PER_US`].
     pub(crate) fn limited(&self, demanded: Torque) -> Torque {
         if self.sight == SEES {
@@ -126,12 +136,13 @@ impl Coast {
         self.sight = BLIND;
     }
 
-    /// Takes a new picture; `agrees` says whether it fits the extrapolated lane. An extrapolation over more than
+    /// Takes a new picture; `agrees` says whether it fits the extrapolated lane, `follows` whether a line elsewhere has
+    /// moved as the vehicle does. An extrapolation over more than
     /// [`MOST_BLIND`] is no evidence: an error of 3 mrad/s in the yaw rate moves it by half a metre in 3 s.
     pub(crate) fn picture_arrived(
         &mut self,
         sample: &LaneSample,
-        agrees: bool,
+        [agrees, follows]: [bool; 2],
         demanded: Torque,
     ) -> PictureVerdict {
         if agrees && self.lost <= MOST_BLIND {
@@ -144,7 +155,7 @@ impl Coast {
             };
         }
         let is_near = sample.e_y.abs() <= NEAR && sample.e_theta.abs() <= ALONG;
-        if self.trust == Ratio::ZERO && is_near {
+        if self.trust == Ratio::ZERO && is_near && follows {
             *self = Self {
                 trust: Ratio::ZERO,
                 ..Self::NEW
@@ -157,7 +168,7 @@ impl Coast {
     }
 
     /// Advances the times and the trust by `elapsed`.
-    pub(crate) fn advance(&mut self, elapsed: Micros) {
+    pub(crate) fn advance(&mut self, elapsed: Micros, is_line_doubted: bool) {
         let (us, blind, lost) = (elapsed.us(), self.blind.us(), self.lost.us());
         let (per_s, blind, lost) = match self.sight {
             SEES => (RISE, blind.saturating_sub(us >> 1), 0),
@@ -166,6 +177,35 @@ impl Coast {
         };
         (self.blind, self.lost) = (Micros::from_us(blind), Micros::from_us(lost));
         let change = Ratio::from_fixed(per_second(per_s.fixed(), elapsed));
-        self.trust = self.trust.plus(change).max(Ratio::ZERO).min(Ratio::ONE);
+        let most = if is_line_doubted { BELIEVED } else { Ratio::ONE };
+        self.trust = self.trust.plus(change).max(Ratio::ZERO).min(most);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 16 counts of 2^-24 N.m in each of a million microseconds: 0.954 N.m, however much longer it lasts.
+    #[test]
+    fn the_torque_departs_from_the_last_pictures_by_what_a_second_allows() {
+        for (lost_ms, most_nm) in [(500, 0.4768), (1000, 0.9537), (1300, 0.9537), (4000, 0.9537)] {
+            for sign in [1.0, -1.0] {
+                let coast = Coast {
+                    sight: APART,
+                    lost: Micros::from_ms(lost_ms),
+                    demanded: Torque::from_nm(0.2 * sign),
+                    ..Coast::NEW
+                };
+                for away in [1.0, -1.0] {
+                    let limited = coast.limited(Torque::from_nm(5.0 * away)).nm();
+                    let expected = 0.2 * sign + away * most_nm;
+                    assert!(
+                        (limited - expected).abs() < 1e-3,
+                        "{lost_ms}: {limited}, not {expected}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -10,14 +10,17 @@
 //!
 //! Not here: a torque that changes and is wrong (the balance of torques in [`crate::safety::plausibility`]).
 
-use crate::quantity::{Micros, Radians, Torque};
+use crate::quantity::{Micros, Radians, Speed, Torque, product, product_of_three};
 
 /// How long the torque has to stay the same.
 pub const LASTS: Micros = Micros::from_ms(1000);
 /// The wheel has to turn within this time; a slower turn is ordinary driving on a nearly straight road.
 pub const WITHIN: Micros = Micros::from_ms(2000);
-/// How far the wheel may turn meanwhile during guidance: 8 deg. Driver models without noise reach 6 deg.
+/// How far the wheel may turn meanwhile during guidance: 8 deg. Driver models without noise reach 6 deg at 40 km/h.
 pub const MOST_TURN: Radians = Radians::from_rad(0.14);
+/// Below 40 km/h a road asks for larger turns, and each changes the aligning torque less: the limit grows as the
+/// square of the speed falls, so that it stays that of one lateral acceleration, 0.39 m/s2 for the paper's car.
+pub const SLOW: Speed = Speed::from_m_per_s(40.0 / 3.6);
 /// How far it may turn in Standby and beside the probe: 0.5 deg, five steps of an ordinary sensor.
 pub const MOST_TURN_WHEN_TESTED: Radians = Radians::from_rad(0.0087);
 /// Marks a torque that was found frozen, until it changes.
@@ -36,9 +39,16 @@ pub struct FrozenTorqueState {
 
 impl FrozenTorqueState {
     /// Takes a driver torque and a wheel angle that arrive `passed` after the last ones, and returns whether the
-    /// torque is alive. With `is_tested`, in Standby and beside the probe, the smaller turn counts.
+    /// torque is alive. With `is_tested`, in Standby and beside the probe, the smaller turn counts, at any speed.
     #[must_use]
-    pub fn is_alive(&mut self, torque: Torque, wheel: Radians, passed: Micros, is_tested: bool) -> bool {
+    pub fn is_alive(
+        &mut self,
+        torque: Torque,
+        wheel: Radians,
+        speed: Speed,
+        passed: Micros,
+        is_tested: bool,
+    ) -> bool {
         if torque != self.torque {
             (self.torque, self.is_tested) = (torque, is_tested);
             self.restart(wheel);
@@ -54,13 +64,16 @@ impl FrozenTorqueState {
         }
         self.lasted = Micros::from_us(self.lasted.us().saturating_add(passed.us()));
         (self.least, self.most) = (self.least.min(wheel), self.most.max(wheel));
-        let turn = self.most.bits().saturating_sub(self.least.bits());
-        let most_turn = if is_tested {
-            MOST_TURN_WHEN_TESTED
+        let (most_turn, speed) = if is_tested {
+            (MOST_TURN_WHEN_TESTED, SLOW)
         } else {
-            MOST_TURN
+            (MOST_TURN, speed.min(SLOW))
         };
-        let is_found = self.lasted >= LASTS && turn > most_turn.bits();
+        let at = |speed: Speed, turn: Radians| {
+            product_of_three(product(speed.fixed(), speed.fixed()), turn.fixed())
+        };
+        let turn = self.most.minus(self.least);
+        let is_found = self.lasted >= LASTS && at(speed, turn) > at(SLOW, most_turn);
         if is_found {
             self.lasted = FOUND;
         }
@@ -79,29 +92,36 @@ mod tests {
 
     /// After how many ms of messages 2 ms apart the torque is found still; the wheel by ms, deg.
     fn found_ms(
+        kmh: f64,
         wheel_deg: impl Fn(u32) -> f64,
         torque_nm: impl Fn(u32) -> f64,
         is_tested: bool,
     ) -> Option<u32> {
         let mut state = FrozenTorqueState::default();
+        let speed = Speed::from_m_per_s(kmh / 3.6);
         (0..10_000).step_by(2).find(|ms| {
             let wheel = Radians::from_rad(wheel_deg(*ms).to_radians());
             let torque = Torque::from_nm(torque_nm(*ms));
-            !state.is_alive(torque, wheel, Micros::from_ms(2), is_tested)
+            !state.is_alive(torque, wheel, speed, Micros::from_ms(2), is_tested)
         })
     }
 
     #[test]
     fn a_torque_that_is_still_while_the_wheel_turns_is_found_after_a_second() {
         for sign in [1.0, -1.0] {
-            for (torque, deg_per_s, is_tested, found) in [
-                (0.0, 8.1, false, 1000),
-                (0.7, 20.0, false, 1000),
-                // 8 deg within two seconds.
-                (-0.7, 4.2, false, 1910),
-                (0.0, 0.4, true, 1250),
+            for (kmh, torque, deg_per_s, is_tested, found) in [
+                (40.0, 0.0, 8.1, false, 1000),
+                (130.0, 0.7, 20.0, false, 1000),
+                // 8.02 deg within two seconds.
+                (130.0, -0.7, 4.2, false, 1910),
+                // Four times as much at half of 40 km/h: 32.1 deg.
+                (20.0, 0.3, 33.0, false, 1000),
+                (20.0, 0.3, 16.4, false, 1957),
+                (20.0, 0.0, 0.4, true, 1250),
+                (130.0, 0.0, 0.4, true, 1250),
             ] {
                 let ms = found_ms(
+                    kmh,
                     |ms| sign * deg_per_s * 1e-3 * f64::from(ms),
                     |_| torque,
                     is_tested,
@@ -113,14 +133,16 @@ mod tests {
             }
             // Slower than that, and as fast but with a torque that moves by its last bit every second.
             let slowly = |ms: u32| sign * 3.9e-3 * f64::from(ms);
-            assert_eq!(found_ms(slowly, |_| 0.3, false), None);
+            assert_eq!(found_ms(40.0, slowly, |_| 0.3, false), None);
+            let slowly_at_20 = |ms: u32| sign * 15.9e-3 * f64::from(ms);
+            assert_eq!(found_ms(20.0, slowly_at_20, |_| 0.3, false), None);
             let bit = |ms: u32| f64::from(ms / 990 % 2) / f64::from(1 << 24);
-            assert_eq!(found_ms(|ms| sign * 0.02 * f64::from(ms), bit, false), None);
+            assert_eq!(found_ms(40.0, |ms| sign * 0.02 * f64::from(ms), bit, false), None);
         }
         // To and fro, as by the probe: 0.6 deg between the ends.
         let to_and_fro = |ms: u32| 0.3 * (f64::from(ms) * 0.015_7).sin();
-        assert_eq!(found_ms(to_and_fro, |_| 0.1, true), Some(1000));
-        assert_eq!(found_ms(|ms| 0.8 * to_and_fro(ms), |_| 0.1, true), None);
+        assert_eq!(found_ms(40.0, to_and_fro, |_| 0.1, true), Some(1000));
+        assert_eq!(found_ms(40.0, |ms| 0.8 * to_and_fro(ms), |_| 0.1, true), None);
     }
 
     #[test]
@@ -128,7 +150,7 @@ mod tests {
         let mut state = FrozenTorqueState::default();
         let mut still = |torque: f64, deg: f64, ms: u32| {
             let (torque, wheel) = (Torque::from_nm(torque), Radians::from_rad(deg.to_radians()));
-            state.is_alive(torque, wheel, Micros::from_ms(ms), false)
+            state.is_alive(torque, wheel, SLOW, Micros::from_ms(ms), false)
         };
         assert!(still(0.2, 0.0, 0) && still(0.2, 9.0, 999));
         assert!(!still(0.2, 9.0, 1) && !still(0.2, 9.0, 5000) && !still(0.2, 0.0, 5000));
@@ -141,9 +163,11 @@ mod tests {
         for was_tested in [false, true] {
             let mut state = FrozenTorqueState::default();
             for deg in [0.0, 2.0] {
-                assert!(state.is_alive(Torque::from_nm(0.1), wheel(deg), Micros::from_ms(900), was_tested));
+                let (torque, passed) = (Torque::from_nm(0.1), Micros::from_ms(900));
+                assert!(state.is_alive(torque, wheel(deg), SLOW, passed, was_tested));
             }
-            let alive = state.is_alive(Torque::from_nm(0.1), wheel(2.0), Micros::from_ms(200), true);
+            let (torque, passed) = (Torque::from_nm(0.1), Micros::from_ms(200));
+            let alive = state.is_alive(torque, wheel(2.0), SLOW, passed, true);
             assert_eq!(alive, !was_tested);
         }
     }

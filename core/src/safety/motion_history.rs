@@ -60,16 +60,36 @@ impl Heading {
     }
 }
 
-/// The rings of headings and of directions of the line.
+/// Directions of a line at the far point, relative to the same direction as the headings.
+#[derive(Debug, Clone)]
+struct Line {
+    directions: [(Instant, I8F24); RING],
+    last: usize,
+    /// How many entries are valid.
+    known: usize,
+}
+
+impl Line {
+    const NEW: Self = Self {
+        directions: [(Instant::from_us(0), I8F24::ZERO); RING],
+        last: 0,
+        known: 0,
+    };
+
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    fn place(&self, back: usize) -> (Instant, I8F24) {
+        self.directions[self.last.wrapping_sub(back) % RING]
+    }
+}
+
+/// The rings of headings and of directions: of the line that is followed, and of another one that pictures show.
 #[derive(Debug, Clone)]
 pub struct MotionHistory {
     headings: [Heading; RING],
     newest: usize,
-    /// Directions of the line at the far point, relative to the same direction as the headings.
-    lines: [(Instant, I8F24); RING],
-    last_line: usize,
-    /// How many entries of `lines` are valid.
-    known_lines: usize,
+    lines: [Line; 2],
+    /// Which of the two is followed, modulo 2.
+    followed: usize,
 }
 
 impl MotionHistory {
@@ -79,9 +99,8 @@ impl MotionHistory {
         Self {
             headings: [Heading::NONE; RING],
             newest: 0,
-            lines: [(Instant::from_us(0), I8F24::ZERO); RING],
-            last_line: 0,
-            known_lines: 0,
+            lines: [Line::NEW; 2],
+            followed: 0,
         }
     }
 
@@ -121,37 +140,37 @@ impl MotionHistory {
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn record_line(&mut self, now: Instant, at: Instant, e_theta: Radians) {
         let direction = self.heading(now, at).psi_at(at).wrapping_add(e_theta.fixed());
-        if self.known_lines == 0 || at.since(self.lines[self.last_line % RING].0) >= APART {
-            self.last_line = self.last_line.wrapping_add(1);
-            self.lines[self.last_line % RING] = (at, direction);
-            self.known_lines = self.known_lines.saturating_add(1).min(RING);
+        let line = &mut self.lines[self.followed % 2];
+        if line.known == 0 || at.since(line.place(0).0) >= APART {
+            line.last = line.last.wrapping_add(1);
+            line.directions[line.last % RING] = (at, direction);
+            line.known = line.known.saturating_add(1).min(RING);
         }
     }
 
     /// The direction that the line had at the far point at the time `before` an instant, relative to the vehicle's
     /// heading at that instant. `None` where the line was not yet known.
-    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
     pub fn line_direction(&self, now: Instant, at: Instant, before: Micros) -> Option<Radians> {
-        let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
+        let line = self.followed();
         let wanted = at.before(before);
         let age = now.since(wanted);
         // Bisection for the newest entry that is at least as old; entries further back are older.
-        let (mut back, mut end) = (0, self.known_lines);
+        let (mut back, mut end) = (0, line.known);
         while back < end {
             let middle = back.wrapping_add(end) / 2;
-            if now.since(place(middle).0) >= age {
+            if now.since(line.place(middle).0) >= age {
                 end = middle;
             } else {
                 back = middle.saturating_add(1);
             }
         }
-        if back >= self.known_lines {
+        if back >= line.known {
             return None;
         }
-        let (from, direction) = place(back);
+        let (from, direction) = line.place(back);
         // Linear interpolation to the next entry.
-        let (to, next) = place(back.saturating_sub(1));
+        let (to, next) = line.place(back.saturating_sub(1));
         let (span, done) = (to.since(from).us(), wanted.since(from).us());
         let share = done
             .min(100_000)
@@ -168,12 +187,11 @@ impl MotionHistory {
 
     /// The change of the line's direction at the far point relative to the vehicle's heading, from one instant to a
     /// later one, if the line keeps its present bend.
-    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
     pub fn direction_change(&self, now: Instant, from: Instant, to: Instant) -> Radians {
-        let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
-        let (newest, direction) = place(0);
-        let (oldest, before) = place(self.known_lines.saturating_sub(1).min(BEND));
+        let line = self.followed();
+        let (newest, direction) = line.place(0);
+        let (oldest, before) = line.place(line.known.saturating_sub(1).min(BEND));
         let bent = i64::from(direction.wrapping_sub(before).to_bits()).saturating_mul(1_000_000);
         let rate = I8F24::from_bits(signed_quotient(bent, newest.since(oldest).us()));
         let psi = |at: Instant| self.heading(now, at).psi_at(at);
@@ -181,9 +199,20 @@ impl MotionHistory {
         Radians::from_fixed(per_second(rate, to.since(from)).saturating_sub(turned))
     }
 
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo two")]
+    fn followed(&self) -> &Line {
+        &self.lines[self.followed % 2]
+    }
+
+    /// Follows the other line from now on.
+    pub(crate) fn swap_lines(&mut self) {
+        self.followed ^= 1;
+    }
+
     /// Forgets the line, which was lost.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo two")]
     pub fn forget_line(&mut self) {
-        self.known_lines = 0;
+        self.lines[self.followed % 2].known = 0;
     }
 }
 

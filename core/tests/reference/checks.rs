@@ -1,6 +1,6 @@
 //! The plausibility checks in f64, as docs/explanation/plausibility.md has them.
 
-use super::receivers::Lane;
+use super::receivers::{Lane, follows};
 use super::{Constants, down, exceeds, leak, per_second};
 use std::collections::VecDeque;
 
@@ -9,6 +9,8 @@ use std::collections::VecDeque;
 pub(crate) struct MotionHistory {
     headings: VecDeque<Heading>,
     lines: VecDeque<(i64, f64)>,
+    /// Of another line that pictures show.
+    others: VecDeque<(i64, f64)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +68,10 @@ impl MotionHistory {
 
     pub(crate) fn forget_line(&mut self) {
         self.lines.clear();
+    }
+
+    fn swap(&mut self) {
+        std::mem::swap(&mut self.lines, &mut self.others);
     }
 
     /// The line's direction `between` before, against the heading at `at`.
@@ -150,6 +156,9 @@ pub(crate) struct Checks {
     lane: Option<Lane>,
     lane_is_known: bool,
     lane_is_alive: bool,
+    other: Option<Lane>,
+    is_doubted: bool,
+    turned: f64,
     predicted: f64,
     seen: f64,
     lane_bias: f64,
@@ -185,6 +194,54 @@ impl Checks {
 
     pub(crate) fn forget_lane(&mut self) {
         (self.lane_is_known, self.predicted, self.seen) = (false, 0.0, 0.0);
+        (self.other, self.is_doubted) = (None, false);
+    }
+
+    pub(crate) fn is_doubted(&self) -> bool {
+        self.is_doubted
+    }
+
+    pub(crate) fn forget_other(&mut self) {
+        self.other = None;
+    }
+
+    /// The other line is followed, and what was summed up stays.
+    pub(crate) fn adopt_other(&mut self, history: &mut MotionHistory) {
+        history.swap();
+        (self.lane_is_known, self.lane) = (self.other.is_some(), self.other.take());
+        (self.is_doubted, self.turned) = (true, 0.0);
+    }
+
+    /// A picture of another line, whose movements count as those of the line itself.
+    pub(crate) fn other_lane(&mut self, c: &Constants, history: &mut MotionHistory, picture: Lane) -> Moved {
+        let followed = (self.lane_is_known, self.lane);
+        history.swap();
+        self.lane = self.other.filter(|last| follows(last, &picture));
+        self.lane_is_known = self.lane.is_some();
+        if self.lane.is_none() {
+            history.forget_line();
+        }
+        let moved = self.lane(c, history, picture);
+        history.swap();
+        self.other = self.lane;
+        (self.lane_is_known, self.lane) = followed;
+        moved
+    }
+
+    /// Watched for as long as the vehicle needs from the near point to the far point, with half of the margin at most.
+    pub(crate) fn other_follows(&self, c: &Constants, history: &mut MotionHistory) -> bool {
+        history.swap();
+        let is_watched = self
+            .other
+            .is_some_and(|last| history.line_direction(last.at, c.between).is_some());
+        history.swap();
+        let half = if self.yaw_rate.is_some() { 0.2 } else { 0.5 };
+        is_watched && !exceeds(self.missing().abs(), half)
+    }
+
+    fn missing(&self) -> f64 {
+        let sign = if self.predicted < 0.0 { -1.0 } else { 1.0 };
+        sign * (self.predicted - self.seen)
     }
 
     pub(crate) fn forget_column(&mut self) {
@@ -243,6 +300,7 @@ impl Checks {
         } else {
             (1.0, 2.0, 0.5)
         };
+        let unreal = if self.is_doubted { unreal / 2.0 } else { unreal };
         let last = self.lane.filter(|last| self.lane_is_known && last.at != lane.at);
         if let Some(last) = last {
             let dt = lane.at - last.at;
@@ -254,10 +312,17 @@ impl Checks {
             self.predicted = leak(self.predicted, predicted, dt);
             self.seen = leak(self.seen, seen, dt);
             self.lane_is_alive = lane.e_y != last.e_y || lane.e_theta != last.e_theta;
+            if self.is_doubted {
+                let turned = c.near_time * self.v * history.heading(lane.at).rate;
+                self.turned = leak(self.turned, per_second(turned, dt), dt);
+            }
         }
         (self.lane_is_known, self.lane) = (true, Some(lane));
-        let sign = if self.predicted < 0.0 { -1.0 } else { 1.0 };
-        let missing = sign * (self.predicted - self.seen);
+        let missing = self.missing();
+        if self.is_doubted {
+            let moved = self.predicted.abs().max(self.turned.abs());
+            self.is_doubted = exceeds(0.2, moved) || exceeds(missing.abs(), moved / 4.0);
+        }
         let is_missing = exceeds(missing, margin) && exceeds(self.predicted.abs(), margin / 2.0);
         if !is_missing && !exceeds(missing.abs(), unreal) {
             return Moved::Consistent;
@@ -304,7 +369,7 @@ pub(crate) struct Still {
 }
 
 impl Still {
-    pub(crate) fn is_alive(&mut self, torque: f64, wheel: f64, passed: i64, is_tested: bool) -> bool {
+    pub(crate) fn is_alive(&mut self, torque: f64, wheel: f64, v: f64, passed: i64, is_tested: bool) -> bool {
         if torque != self.torque {
             *self = Self {
                 torque,
@@ -323,7 +388,12 @@ impl Still {
         }
         self.lasted += passed;
         self.wheels = [self.wheels[0].min(wheel), self.wheels[1].max(wheel)];
-        let most = if is_tested { 0.0087 } else { 0.14 };
+        // 8 deg from 40 km/h on, below it so far that the lateral acceleration is as large.
+        let most = if is_tested {
+            0.0087
+        } else {
+            0.14 * (40.0 / 3.6 / v).powi(2).max(1.0)
+        };
         self.is_found = self.lasted >= 1_000_000 && exceeds(self.wheels[1] - self.wheels[0], most);
         !self.is_found
     }

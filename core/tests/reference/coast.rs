@@ -35,6 +35,10 @@ impl Coast {
         self.sight == Sight::Sees && self.trust == 1.0 && self.blind == 0
     }
 
+    pub(super) fn is_long_blind(&self) -> bool {
+        self.sight == Sight::Blind && self.lost >= 200_000
+    }
+
     pub(super) fn goes_on(&self) -> bool {
         let is_short = match self.sight {
             Sight::Sees => false,
@@ -72,20 +76,21 @@ impl Reference {
                     .checks
                     .extrapolated(&self.c, &self.history, &last, picture.at);
                 let is_near = picture.e_y.abs() <= 0.8 && picture.e_theta.abs() <= 0.2;
+                let moves = self.checks.other_follows(&self.c, &mut self.history);
                 if coast.lost <= 1_000_000 && follows(&expected, &picture) {
                     // From where the line went on to until the picture is no rate.
                     if coast.sight != Sight::Sees {
                         self.law.last = Some(picture);
+                        self.checks.forget_other();
                     }
                     coast.sight = Sight::Sees;
-                } else if coast.trust == 0.0 && is_near {
+                } else if coast.trust == 0.0 && is_near && moves {
                     *coast = Coast {
                         trust: 0.0,
                         ..Coast::NEW
                     };
                     self.law = Law::default();
-                    self.checks.forget_lane();
-                    self.history.forget_line();
+                    self.checks.adopt_other(&mut self.history);
                 } else {
                     if coast.sight == Sight::Sees {
                         coast.demanded = demanded;
@@ -109,7 +114,8 @@ impl Reference {
                 -2.0
             }
         };
-        coast.trust = (coast.trust + per_second(per_s, elapsed)).clamp(0.0, 1.0);
+        let most = if self.checks.is_doubted() { 0.5 } else { 1.0 };
+        coast.trust = (coast.trust + per_second(per_s, elapsed)).clamp(0.0, most);
         let mut reported = FaultSet::NONE;
         reported.insert_if(coast.sight == Sight::Apart, Fault::LaneStep);
         if !coast.goes_on() {

@@ -15,7 +15,7 @@ mod receivers;
 mod torque;
 
 use checks::{Checks, MotionHistory, Moved, Still};
-use coast::Coast;
+use coast::{Coast, Sight};
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::controller::inputs::Input;
 use haptic_core::controller::params::Params;
@@ -317,7 +317,8 @@ impl Reference {
             self.outputs[1].push(now, kept);
         }
         let warning = matches!(self.mode, Mode::Handover | Mode::Fault | Mode::Locked)
-            || (self.mode == Mode::Active && faults.contains(Fault::LaneStep))
+            || (self.mode == Mode::Active
+                && (faults.contains(Fault::LaneStep) || self.coast.is_long_blind()))
             || faults.contains(Fault::HandsOff);
         Said {
             torque,
@@ -409,7 +410,7 @@ impl Reference {
             let passed = self.checks.since_column(now);
             let is_alive = self
                 .still
-                .is_alive(column.driver, column.wheel, passed, is_tested);
+                .is_alive(column.driver, column.wheel, self.checks.v, passed, is_tested);
             let belongs = self
                 .checks
                 .column(&self.c, now, column.driver, column.wheel, self.applied);
@@ -417,11 +418,16 @@ impl Reference {
         }
         let is_new = matches!(lane, Input::New(_));
         if let (true, Some(lane)) = (is_due(is_new, &mut self.pending[0]), lane.value()) {
-            if self.coast.goes_on() {
+            let moved = if self.coast.goes_on() {
                 self.checks.went_on(&mut self.history, lane);
-                return;
-            }
-            let moved = self.checks.lane(&self.c, &mut self.history, lane);
+                let picture = seen.lane.value();
+                let Some(picture) = picture.filter(|_| self.coast.sight == Sight::Apart) else {
+                    return;
+                };
+                self.checks.other_lane(&self.c, &mut self.history, picture)
+            } else {
+                self.checks.lane(&self.c, &mut self.history, lane)
+            };
             self.kept
                 .set(moved == Moved::Inconsistent, Fault::LaneImplausible);
             if moved == Moved::ContradictsYawRate {

@@ -37,6 +37,8 @@ pub(crate) struct Watch {
     anchor_t_us: u64,
     /// Time and magnitude of the outputs of the last while, without the probe.
     outputs: VecDeque<(u64, f64)>,
+    /// For how long pictures have been missing in Active.
+    dark_us: u64,
     /// Where the handover's line begins, and when.
     line: (f64, u64),
     pub(crate) steps: u64,
@@ -56,6 +58,7 @@ impl Watch {
             anchor: 0.0,
             anchor_t_us: 0,
             outputs: VecDeque::new(),
+            dark_us: 0,
             line: (0.0, 0),
             steps: 0,
             by_mode: [0; 7],
@@ -95,6 +98,15 @@ impl Watch {
     )]
     pub(crate) fn check(&mut self, rig: &Rig, step: &Step) {
         let (torque, mode) = (step.command.torque.nm(), step.command.mode);
+        // Without a picture from 0.2 s on, give or take a few steps.
+        let is_dark = [Fault::LaneTimeout, Fault::LaneInvalid, Fault::LaneStep]
+            .into_iter()
+            .any(|fault| step.command.faults.contains(fault));
+        self.dark_us = if mode == Mode::Active && is_dark {
+            self.dark_us + rig.t_us - self.t_us
+        } else {
+            0
+        };
         let context = || format!("t = {} us, {:?}, was {self:?}", rig.t_us, step.command);
         let dt_s = (rig.t_us - self.t_us).min(2000) as f64 * 1e-6;
 
@@ -180,8 +192,11 @@ impl Watch {
                 context()
             );
         }
+        let may_warn = (180_000..220_000).contains(&self.dark_us) && step.command.warning;
         let must_warn = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked)
             || (mode == Mode::Active && step.command.faults.contains(Fault::LaneStep))
+            || self.dark_us >= 220_000
+            || may_warn
             || step.command.faults.contains(Fault::HandsOff);
         assert_eq!(step.command.warning, must_warn, "warning: {}", context());
         if must_warn && mode != self.mode && !matches!(self.mode, Mode::Handover | Mode::Fault | Mode::Locked)

@@ -207,6 +207,7 @@ pub(super) fn result(
             row.name, outcome.seed
         ),
     };
+    let limits = row.limits(limits);
     let failures = outcomes.iter().filter_map(|outcome| match &outcome.failure {
         Some(violation) => Some(failed(
             outcome,
@@ -285,7 +286,16 @@ fn quantile<T: Copy>(sorted: &[T], percent: usize) -> Option<T> {
 
 /// What is wrong with a deviation by itself.
 fn beyond(row: &FaultCase, deviation: &Deviation, limits: Limits) -> Option<String> {
-    (row.is_limited() && deviation.faulted_m > limits.deviation_m && !deviation.is_off_road()).then(|| {
+    if !row.is_limited() {
+        return None;
+    }
+    let pushed = deviation.pushed_m.zip(limits.pushed_m);
+    if let Some((pushed_m, most_m)) = pushed.filter(|(pushed_m, most_m)| pushed_m > most_m) {
+        return Some(format!(
+            "a false torque pushed the vehicle {pushed_m:.2} m aside, {most_m:.2} m are allowed with these drivers"
+        ));
+    }
+    (deviation.faulted_m > limits.deviation_m && !deviation.is_off_road()).then(|| {
         format!(
             "the vehicle went {:.2} m aside, {:.2} m are allowed with these drivers",
             deviation.faulted_m, limits.deviation_m

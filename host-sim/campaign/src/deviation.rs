@@ -11,6 +11,8 @@ use super::table::Class;
 
 /// A run ends so long after the onset, ms.
 pub(super) const AFTER_MS: u32 = 5200;
+/// The same where a lie takes its time, ms.
+pub(super) const LONG_AFTER_MS: u32 = 9000;
 /// A driver who is warned drives as manually so much later, ms.
 const NOTICES_MS: u32 = 1000;
 /// Most that a handover may move the vehicle beyond what dropping the torque in the same step does, m.
@@ -66,7 +68,7 @@ fn apart_m(simulation: &Trial<'_>, from: &Trial<'_>) -> f64 {
 }
 
 /// To the end, with the forks beside it if asked for.
-pub(super) fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Deviation {
+pub(super) fn drive(simulation: &mut Trial<'_>, onset: u32, end: u32, forks: bool) -> Deviation {
     let mut seen = Deviation::default();
     let mut healthy: Option<Trial<'_>> = None;
     let mut dropped: Option<Trial<'_>> = None;
@@ -82,7 +84,7 @@ pub(super) fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Devi
         }
         let left_at = simulation.guidance().left_at();
         let takes_over = left_at.is_some_and(|at| simulation.steps() >= at + NOTICES_MS);
-        let goes_on = simulation.steps() < onset + AFTER_MS && step(simulation, takes_over);
+        let goes_on = simulation.steps() < end && step(simulation, takes_over);
         if !goes_on {
             break;
         }

@@ -16,6 +16,9 @@ pub const OFF_ROAD_M: f64 = 3.6;
 /// From the middle of a lane of 3.6 m to where a vehicle of 1.7 m begins to leave it, m.
 pub(crate) const LANE_EDGE_M: f64 = 0.95;
 
+/// Most that a torque that nobody asked for may push a vehicle whose driver keeps the lane, m: a quarter of the way to the lane's edge.
+const PUSHED_M: f64 = 0.25;
+
 /// Remnant of those who keep the lane in a real car, N.m: that of `host-sim availability` on a motorway.
 const REMNANT_SD_NM: f64 = 0.4;
 
@@ -38,6 +41,8 @@ pub struct Limits {
     pub deviation_m: f64,
     /// Largest share of a row's runs that leave the lane where the fault-free vehicle does not; `None` if it is stated only.
     pub left_lane: Option<f64>,
+    /// Most that a false torque may push the vehicle before it is cut, m; `None` if it is stated only.
+    pub pushed_m: Option<f64>,
 }
 
 impl Drivers {
@@ -61,10 +66,12 @@ impl Drivers {
             Self::Paper => Limits {
                 deviation_m: OFF_ROAD_M,
                 left_lane: None,
+                pushed_m: None,
             },
             Self::Population | Self::Relying => Limits {
                 deviation_m: LANE_EDGE_M,
                 left_lane: Some(0.04),
+                pushed_m: Some(PUSHED_M),
             },
         }
     }

@@ -188,6 +188,12 @@ pub(super) enum Injection {
         ms: u32,
         hides_hand: bool,
     },
+    /// A line that bends away: both lane errors move as if it went so many m aside within so many ms, there and no further.
+    /// Nothing else is false, and nothing contradicts it.
+    BendsAway {
+        by_m: f64,
+        ms: u32,
+    },
     Wire(Wire),
     Clock(Clock),
     Inside(Inside),

@@ -18,7 +18,7 @@
 //! | inputs | no input older than 30 ms in Active, no picture older than a second more, of a late camera 1.35 s |
 //! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s; the line goes three times as fast while the driver opposes, twice without a column, four times beside one that contradicts itself, and starts from zero after an implausible lane |
 //! | fade | never grows, falls by 4 N.m/s |
-//! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked, and beside LaneStep in Active |
+//! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked, beside LaneStep in Active, and there after 0.2 s without a picture |
 
 mod broken;
 mod frame;
@@ -27,7 +27,7 @@ use std::collections::VecDeque;
 
 use haptic_core::bus::Frame;
 
-use super::bytes::{self, ACTIVE, FADE, FAULT, HANDOVER, LOCKED, STANDBY, Status};
+use super::bytes::{self, ACTIVE, FADE, FAULT, HANDOVER, LANE_STEP, LOCKED, STANDBY, Status};
 use broken::Broken;
 use frame::{override_bounds, warned, well_formed};
 
@@ -60,6 +60,8 @@ const LIED_TO: f64 = 4.0;
 const COLUMN_LOST: u64 = 1 << 3;
 const COLUMN_IMPLAUSIBLE: u64 = 1 << 4;
 const LANE_IMPLAUSIBLE: u64 = 1 << 2;
+/// Bits of LaneTimeout, LaneInvalid and LaneStep.
+const PICTURE_FAULTS: u64 = 1 | 1 << 1 | LANE_STEP;
 /// Most time that one cycle may use of a rate.
 const MOST_S: f64 = 0.002;
 /// One LSB of the torque on the bus: a torque is rounded, the bounds are not.
@@ -117,6 +119,8 @@ pub(super) struct InvariantChecker {
     rose: bool,
     standby_since_us: u32,
     ramp: Ramp,
+    /// For how long pictures have been missing in Active, us.
+    dark_us: u32,
     /// Magnitudes of the last 250 ms by the world's clock, rising: the first is the least.
     window: VecDeque<(u64, f64)>,
     /// Magnitudes for as long as one may be trusted, by the ECU's clock.
@@ -239,7 +243,9 @@ impl InvariantChecker {
         let old_mode = before.map_or(if self.starts_active { ACTIVE } else { 0 }, |b| b.mode);
         self.modes(status, old_mode, now_us)?;
         self.ramps(status, old_mode, old_nm, now_us)?;
-        warned(status, before.is_some_and(|b| b.warning), others)
+        let is_dark = status.mode == ACTIVE && status.faults & PICTURE_FAULTS != 0;
+        self.dark_us = if is_dark { self.dark_us + elapsed_us } else { 0 };
+        warned(status, before.is_some_and(|b| b.warning), self.dark_us, others)
     }
 
     fn magnitude(&mut self, world_us: u64, torque_nm: f64) -> Result<(), Broken> {

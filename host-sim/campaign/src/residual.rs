@@ -6,8 +6,8 @@
 //! the near-point error that speed, yaw error and yaw rate predict with the observed one, and the torques on the
 //! column with its movement, each summed with a time constant of 1 s. Vehicle and margins are those of the documents
 //! (`docs/explanation/plausibility.md`), from table 9. A sample that is further from the last one than a vehicle can
-//! move is ignored, until its line is adopted. If there are only such samples for four seconds, the fault counts as
-//! detected.
+//! move belongs to another line, whose movements are compared in the same way until it is adopted. If there are only such
+//! samples for four seconds, the fault counts as detected.
 
 use std::collections::VecDeque;
 
@@ -45,6 +45,10 @@ const ELSEWHERE_S: f64 = 4.0;
 const LET_GO_S: f64 = 0.55;
 const NEAR_M: f64 = 0.8;
 const NEAR_RAD: f64 = 0.2;
+/// A line elsewhere is seen after the three frames of a time-out, s. A line that was adopted is doubted until so much movement was
+/// predicted of it, or turned by the vehicle, and no more than a quarter is missing, m.
+const SEEN_ELSEWHERE_S: f64 = 0.03;
+const SHOWS_M: f64 = 0.2;
 /// t'_n, and the time that the vehicle needs from the near point to the far point, s.
 const NEAR_TIME_S: f64 = 0.3;
 const BETWEEN_S: f64 = 0.4;
@@ -130,6 +134,12 @@ pub(super) struct Residual {
     headings: VecDeque<[f64; 3]>,
     /// When, and the line's direction at the far point in the frame of the headings.
     lines: VecDeque<[f64; 2]>,
+    /// The same of a line elsewhere, with its last sample.
+    other_lines: VecDeque<[f64; 2]>,
+    other: Option<(f64, f64, f64)>,
+    /// A line was adopted and has shown no movement yet; the way by which the vehicle turned its near point.
+    is_doubted: bool,
+    turned_m: f64,
     lane_bias_m_per_s: f64,
     column_bias_nm: f64,
     predicted_m: f64,
@@ -230,16 +240,42 @@ impl Residual {
     pub(super) fn lane(&mut self, time_s: f64, e_y_m: f64, e_theta_rad: f64) {
         let e_y_m = e_y_m.clamp(-LANE_RANGE_M, LANE_RANGE_M);
         let e_theta_rad = e_theta_rad.clamp(-YAW_RANGE_RAD, YAW_RANGE_RAD);
+        let sample = (time_s, e_y_m, e_theta_rad);
         if let Some((before_s, y, theta)) = self.lane
             && (is_a_step([y, theta], [e_y_m, e_theta_rad]) || time_s - before_s >= LET_GO_S)
         {
-            if time_s - before_s < LET_GO_S || !is_near([e_y_m, e_theta_rad]) {
-                return;
+            self.swap_lines();
+            if self
+                .lane
+                .is_none_or(|(_, y, theta)| is_a_step([y, theta], [e_y_m, e_theta_rad]))
+            {
+                self.lines.clear();
+                self.lane = None;
             }
-            // The next sample is compared with nothing.
-            self.lines.clear();
-            (self.predicted_m, self.moved_m, self.lane) = (0.0, 0.0, None);
+            // Its movements count from the time-out on, when the ECU sees it.
+            if time_s - before_s >= SEEN_ELSEWHERE_S {
+                self.compare(sample);
+            }
+            let is_watched =
+                self.line_rate(time_s).is_some() && self.missing_m().abs() <= 0.5 * LANE_MARGIN_M;
+            if time_s - before_s >= LET_GO_S && is_near([e_y_m, e_theta_rad]) && is_watched {
+                (self.other, self.is_doubted, self.turned_m) = (None, true, 0.0);
+            } else {
+                self.swap_lines();
+            }
+            return;
         }
+        self.other = None;
+        self.compare(sample);
+    }
+
+    fn swap_lines(&mut self) {
+        std::mem::swap(&mut self.lines, &mut self.other_lines);
+        std::mem::swap(&mut self.lane, &mut self.other);
+    }
+
+    /// Compares a sample with the last one of its line.
+    fn compare(&mut self, (time_s, e_y_m, e_theta_rad): (f64, f64, f64)) {
         if let Some((before_s, y, _)) = self.lane {
             let dt = time_s - before_s;
             let moved = e_y_m - y;
@@ -250,6 +286,10 @@ impl Residual {
             let kept = (-dt / MEMORY_S).exp();
             self.predicted_m = self.predicted_m * kept + predicted;
             self.moved_m = self.moved_m * kept + moved;
+            let turned = self.speeds_m_per_s[0] * NEAR_TIME_S * self.yaw_rate_rad_per_s * dt;
+            self.turned_m = self.turned_m * kept + turned;
+            let shown = self.predicted_m.abs().max(self.turned_m.abs());
+            self.is_doubted &= shown < SHOWS_M || self.missing_m().abs() > 0.25 * shown;
         }
         let direction = self.heading(time_s) + e_theta_rad;
         self.lines.push_back([time_s, direction]);
@@ -257,6 +297,11 @@ impl Residual {
             self.lines.pop_front();
         }
         self.lane = Some((time_s, e_y_m, e_theta_rad));
+    }
+
+    /// The part of the predicted movement that was not seen, positive in its direction, m.
+    fn missing_m(&self) -> f64 {
+        (self.predicted_m - self.moved_m) * self.predicted_m.signum()
     }
 
     /// How fast the near-point error must move at a time, if the line is known for long enough.
@@ -298,10 +343,11 @@ impl Residual {
         if silence_s > ELSEWHERE_S {
             return f64::INFINITY;
         }
-        let missing = (self.predicted_m - self.moved_m) * self.predicted_m.signum();
+        let missing = self.missing_m();
         // A missing movement counts only if at least half the margin was predicted.
         let slow = (missing / LANE_MARGIN_M).min(self.predicted_m.abs() / (0.5 * LANE_MARGIN_M));
-        slow.max(missing.abs() / UNREAL_M)
+        let unreal_m = if self.is_doubted { 0.5 * UNREAL_M } else { UNREAL_M };
+        slow.max(missing.abs() / unreal_m)
     }
 
     /// Share of the column's margin that is used.

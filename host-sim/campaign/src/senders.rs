@@ -16,8 +16,9 @@ use haptic_sim::models::sensors;
 
 const COLUMN_PERIOD_MS: u32 = 2;
 const HOST_PERIOD_MS: u32 = 10;
-/// t'_f, s.
+/// t'_f, and the time that the vehicle needs from the near point to the far point, s.
 const FAR_TIME_S: f64 = 0.7;
+const BETWEEN_S: f64 = 0.4;
 
 /// What the senders believe in one step.
 #[derive(Debug, Clone, Copy)]
@@ -125,6 +126,17 @@ impl Senders {
         acting: &[Injection],
         since_s: f64,
     ) -> SensorReadings {
+        if let Some((by_m, ms)) = first_of!(acting, Injection::BendsAway { by_m, ms } => (*by_m, *ms)) {
+            let lasts_s = f64::from(ms) * 1e-3;
+            // Half a wave of a cosine: how far it has gone, and how fast it goes.
+            let phase = |at_s: f64| std::f64::consts::PI * (at_s / lasts_s).clamp(0.0, 1.0);
+            let aside_m = 0.5 * by_m * (1.0 - phase(since_s).cos());
+            let m_per_s = 0.5 * by_m * std::f64::consts::PI / lasts_s * phase(since_s + BETWEEN_S).sin();
+            let lane = honest.lane.map(|(e_y_m, e_theta_rad)| {
+                (e_y_m + aside_m, e_theta_rad + m_per_s / observation.speed_m_per_s)
+            });
+            return SensorReadings { lane, ..honest };
+        }
         let false_lane =
             first_of!(acting, Injection::FalseLane { to_m, ms, hides_hand } => (*to_m, *ms, *hides_hand));
         let Some((to_m, ms, hides_hand)) = false_lane else {

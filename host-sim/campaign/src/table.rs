@@ -15,6 +15,8 @@ use haptic_sim::models::nonlinear::WorldParameters;
 use serde::Serialize;
 
 use super::bytes::{FAULT, HANDOVER};
+use super::deviation::AFTER_MS;
+use super::drivers::Limits;
 use super::injection::{Hand, Injection, Motor, Start};
 use super::residual::Detectability;
 
@@ -29,6 +31,7 @@ mod attacks;
 mod build;
 mod bus;
 mod inputs;
+mod lies;
 mod memory;
 mod time;
 mod vehicle;
@@ -142,6 +145,11 @@ pub struct FaultCase {
     pub(super) after_sample: bool,
     /// Where on the road it begins, if not anywhere.
     pub(super) place_on_road: Option<PlaceOnRoad>,
+    /// How far its lie may take the vehicle, m, if that is not the drivers' limit: nothing or little contradicts it, and who relies
+    /// follows it. For those who keep the lane in a real car, and for the paper's. The share that leaves the lane is stated only.
+    pub(super) lie_m: Option<[f64; 2]>,
+    /// How long the run goes on behind the onset, ms.
+    pub(super) after_ms: u32,
     /// What is less than ideal about the car or the road from the start.
     pub(super) plant: Option<fn(&mut WorldParameters)>,
 }
@@ -178,7 +186,7 @@ pub struct Group {
 }
 
 /// Every row.
-pub const GROUPS: [Group; 6] = [
+pub const GROUPS: [Group; 7] = [
     Group {
         name: "Inputs",
         rows: inputs::ROWS,
@@ -198,6 +206,10 @@ pub const GROUPS: [Group; 6] = [
     Group {
         name: "Camera, motor and road",
         rows: vehicle::ROWS,
+    },
+    Group {
+        name: "Lies that fit together",
+        rows: lies::ROWS,
     },
     Group {
         name: "Attacks by legal frames",
@@ -246,6 +258,8 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
         start: Start::Engaged,
         after_sample: false,
         place_on_road: None,
+        lie_m: None,
+        after_ms: AFTER_MS,
         plant: None,
     }
 }
@@ -275,6 +289,19 @@ impl FaultCase {
     pub(super) fn is_limited(&self) -> bool {
         let opposes = |one: &Injection| matches!(one, Injection::Hand(Hand::Opposes { .. }));
         self.obeys() && !self.injections.iter().any(opposes)
+    }
+
+    /// The limits of these drivers for this row.
+    pub(super) fn limits(&self, drivers: Limits) -> Limits {
+        self.lie_m.map_or(drivers, |[keepers_m, papers_m]| Limits {
+            deviation_m: if drivers.left_lane.is_some() {
+                keepers_m
+            } else {
+                papers_m
+            },
+            left_lane: None,
+            ..drivers
+        })
     }
 
     /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.

@@ -3,7 +3,7 @@
 //!
 //! The seed decides driver, speed, side of the curve, place, instant, and whatever the fault draws. Half of the runs meet
 //! the fault in an arc of 0.93 m/s2 at the run's speed, a quarter before it, a quarter behind it. The onset lies 1.5 to 3 s
-//! after the start (4 to 5.5 s behind a curve), and 5.2 s after it the run ends. Drivers who do not keep a lane at the
+//! after the start (4 to 5.5 s behind a curve), and 5.2 s after it the run ends, or 9 s where a lie takes its time. Drivers who do not keep a lane at the
 //! speed, alone and with guidance, do not drive. One second after the ECU has left, the driver drives as manually.
 //!
 //! In a world in which the speed changes, the vehicle brakes or speeds up to another of the campaign's speeds by 1 to 4 m/s2.
@@ -18,7 +18,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use super::deviation::{AFTER_MS, Deviation, drive};
+use super::deviation::{Deviation, LONG_AFTER_MS, drive};
 use super::drivers::{Driver, Drivers, everyone, lane_keeper, relying};
 use super::ecu_harness::EcuHarness;
 use super::injection::Start;
@@ -157,7 +157,7 @@ impl World {
     /// wind or braking, with drivers who keep the lane in such a car.
     pub fn new(kind: Option<&'static WorldKind>) -> Self {
         let surface = kind.map_or(Surface::FLAT, WorldKind::surface);
-        let run_ms = LATEST_ONSET_MS + BEHIND_MS + AFTER_MS;
+        let run_ms = LATEST_ONSET_MS + BEHIND_MS + LONG_AFTER_MS;
         let at = |kmh| PLACES.map(|place| roads::curve(kmh, place, run_ms, surface));
         let drivers = everyone();
         let keeps_lane: Vec<f64> = if kind.is_some_and(WorldKind::changes_speed) {
@@ -172,7 +172,7 @@ impl World {
                 .collect(),
             drivers,
             roads: SPEEDS_KMH.map(at).into(),
-            turning_road: roads::turning(AFTER_MS, surface),
+            turning_road: roads::turning(LONG_AFTER_MS, surface),
             kind,
             driven_by: usual(kind),
             law: 0,
@@ -288,7 +288,7 @@ impl World {
     ) -> (Course, Speed, u32) {
         let road = ChangingRoad {
             change,
-            after_ms: AFTER_MS,
+            after_ms: row.after_ms,
             side: [1.0, -1.0][side],
             surface: self.kind.map_or(Surface::FLAT, WorldKind::surface),
         };
@@ -326,12 +326,15 @@ impl World {
             onset_ms,
             change,
         } = self.draw(row, seed, &mut rng);
-        let mut harness = EcuHarness::new(row, &scenario, onset_ms, onset_ms + AFTER_MS, rng);
+        let end_ms = onset_ms + row.after_ms;
+        let mut harness = EcuHarness::new(row, &scenario, onset_ms, end_ms, rng);
         if traced {
             harness.keep_trace();
         }
         let mut simulation = Simulation::with(&scenario, harness);
-        let run = catch_unwind(AssertUnwindSafe(|| drive(&mut simulation, onset_ms, !traced)));
+        let run = catch_unwind(AssertUnwindSafe(|| {
+            drive(&mut simulation, onset_ms, end_ms, !traced)
+        }));
         let mut harness = simulation.into_guidance();
         let trace = harness.take_trace();
         let left_at = harness.left_at();

@@ -5,4 +5,5 @@ mod driver_limit;
 mod fdca;
 mod own_law;
 mod shipped_laws;
+mod slow_and_tight;
 mod unguided;

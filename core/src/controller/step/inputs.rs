@@ -106,10 +106,13 @@ impl<I: Injection> Step<'_, I> {
         let is_tested =
             self.memory.fast.packed.mode == STANDBY || self.memory.fast.probe != ProbeState::SILENT;
         let passed = self.memory.plausibility.since_column(self.now);
-        let is_alive =
-            self.once
-                .frozen_torque
-                .is_alive(column.driver_torque, column.wheel_angle, passed, is_tested);
+        let is_alive = self.once.frozen_torque.is_alive(
+            column.driver_torque,
+            column.wheel_angle,
+            self.memory.plausibility.speed(),
+            passed,
+            is_tested,
+        );
         let plausible = self.config.plausibility.column(
             &mut self.memory.plausibility,
             self.now,
@@ -126,18 +129,21 @@ impl<I: Injection> Step<'_, I> {
             return;
         };
         self.changed.add(ChangedParts::LANE);
+        let (checks, now) = (&self.config.plausibility, self.now);
         let (state, motion_history) = (&mut self.memory.plausibility, &mut self.once.motion_history);
-        if self.memory.coast.is_extrapolating() {
-            // No picture, so nothing to compare.
-            state.accept_extrapolation(motion_history, self.now, sample);
-            return;
+        let moved = if self.memory.coast.is_extrapolating() {
+            state.accept_extrapolation(motion_history, now, sample);
+            // Pictures of another line are compared with themselves; where none comes, nothing is.
+            let is_elsewhere = self.memory.coast.sees_other_line();
+            let picture = self.inputs.lane.value().filter(|_| is_elsewhere);
+            picture.map(|picture| checks.other_lane(state, motion_history, now, picture))
+        } else {
+            Some(checks.lane(state, motion_history, now, sample))
+        };
+        if let Some(moved) = moved {
+            kept.set(moved == LaneMotion::Inconsistent, Fault::LaneImplausible);
         }
-        let moved = self
-            .config
-            .plausibility
-            .lane(state, motion_history, self.now, sample);
-        kept.set(moved == LaneMotion::Inconsistent, Fault::LaneImplausible);
-        if moved == LaneMotion::ContradictsYawRate {
+        if moved == Some(LaneMotion::ContradictsYawRate) {
             self.changed.add(ChangedParts::MOTION);
             state.distrust_yaw_rate();
             kept.insert(Fault::YawRate);

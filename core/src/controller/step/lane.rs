@@ -38,7 +38,8 @@ impl<I: Injection> Step<'_, I> {
             Input::New(sample) if !is_older(sample) => self.compare_picture(&last, sample, demanded),
             _ => {}
         }
-        self.memory.coast.advance(self.elapsed);
+        let is_line_doubted = self.memory.plausibility.is_line_doubted();
+        self.memory.coast.advance(self.elapsed, is_line_doubted);
         let mut reported = FaultSet::NONE;
         reported.insert_if(self.memory.coast.sees_other_line(), Fault::LaneStep);
         if !self.memory.coast.is_extrapolating() {
@@ -61,13 +62,23 @@ impl<I: Injection> Step<'_, I> {
     /// What a picture after a silence, or beside a line that it does not show, makes of the lane.
     fn compare_picture(&mut self, last: &LaneSample, sample: LaneSample, demanded: Torque) {
         let agrees = lane_step_is_possible(&self.extrapolated_lane(last, sample.at), &sample);
-        match self.memory.coast.picture_arrived(&sample, agrees, demanded) {
+        let (checks, motion_history) = (&self.config.plausibility, &mut self.once.motion_history);
+        let follows = checks.other_line_follows(&self.memory.plausibility, motion_history, self.now);
+        let verdict = self
+            .memory
+            .coast
+            .picture_arrived(&sample, [agrees, follows], demanded);
+        match verdict {
             // From the extrapolated line to the picture is a jump, and no rate.
-            PictureVerdict::Returned => self.memory.law.relocate(sample),
+            PictureVerdict::Returned => {
+                self.memory.law.relocate(sample);
+                self.memory.plausibility.forget_other_line();
+            }
             PictureVerdict::Adopted => {
                 self.memory.law = LawState::NEW;
-                self.memory.plausibility.forget_lane();
-                self.once.motion_history.forget_line();
+                self.memory
+                    .plausibility
+                    .adopt_other_line(&mut self.once.motion_history);
             }
             PictureVerdict::Expected | PictureVerdict::Elsewhere => {}
         }

@@ -75,8 +75,9 @@ impl<I: Injection> Step<'_, I> {
         }
         let (torque, probe, limit) = self.torque(mode, faults);
         self.memory.fast.probe_applied = probe.unwrap_or(Torque::ZERO);
-        // In Active with LaneStep the guidance fades away from its old line: the driver must know.
-        let warning = (mode == Mode::Active && faults.contains(Fault::LaneStep))
+        // In Active beside another line, or long without a picture, guidance lets go: the driver must know.
+        let lets_go = faults.contains(Fault::LaneStep) || self.memory.coast.is_long_blind();
+        let warning = (mode == Mode::Active && lets_go)
             || matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked)
             || faults.contains(Fault::HandsOff);
         Command {

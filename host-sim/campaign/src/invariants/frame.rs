@@ -10,6 +10,9 @@ use crate::bytes::{self, ACTIVE, FAULT, HANDOVER, LANE_STEP, LOCKED, Status};
 /// them, so that a new fault is classed here by a person too.
 const CLASSES: [u64; 3] = [0x7_80FF, 0x1F00, 0x6000];
 
+/// The time without a picture after which a warning comes in Active, with some steps to spare, us.
+const WARN_DARK_US: std::ops::RangeInclusive<u32> = 180_000..=220_000;
+
 /// Bit of the fault that no hand is on the wheel: a warning, whatever the mode.
 const HANDS_OFF: u64 = 1 << 19;
 
@@ -45,11 +48,14 @@ pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status
     }
 }
 
-pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), Broken> {
+/// `dark_us` is the time for which pictures have been missing in Active.
+pub(super) fn warned(status: &Status, before: bool, dark_us: u32, others: &[Frame]) -> Result<(), Broken> {
     let must_warn = matches!(status.mode, HANDOVER | FAULT | LOCKED)
         || status.faults & HANDS_OFF != 0
-        || (status.mode == ACTIVE && status.faults & LANE_STEP != 0);
-    if status.warning != must_warn {
+        || (status.mode == ACTIVE && status.faults & LANE_STEP != 0)
+        || dark_us > *WARN_DARK_US.end();
+    let may_warn = WARN_DARK_US.contains(&dark_us);
+    if !may_warn && status.warning != must_warn {
         return Err(Broken::WarningBit {
             warning: status.warning,
             mode: status.mode,

@@ -2,6 +2,7 @@
 
 use super::{CONTRADICTION_MS, Class, Expect, FaultCase, Place, PlaceOnRoad};
 use crate::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LOCKED};
+use crate::deviation::LONG_AFTER_MS;
 use crate::injection::Start;
 use crate::residual::Detectability;
 use haptic_sim::models::nonlinear::WorldParameters;
@@ -55,6 +56,8 @@ words! {
     after_sample() { after_sample: true };
     torque(nm: f64) { torque_nm: nm };
     lasts(ms: u32) { lasts_ms: Some(ms) };
+    /// Little contradicts it: it takes who relies this far, of those who keep the lane and of the paper's, and the run shows where to.
+    takes_along(keepers_m: f64, papers_m: f64) { lie_m: Some([keepers_m, papers_m]), after_ms: LONG_AFTER_MS };
     from(state: Start) { start: state };
     place(place: PlaceOnRoad) { place_on_road: Some(place) };
     on(plant: fn(&mut WorldParameters)) { plant: Some(plant) };

@@ -82,14 +82,18 @@ fn limits(campaign: &Campaign) -> String {
     let Limits {
         deviation_m,
         left_lane,
+        pushed_m,
     } = campaign.limits;
     let share = match left_lane {
         Some(share) => format!("{:.0} % of a row's runs may leave the lane", 100.0 * share),
         None => "how many leave the lane is stated and not judged".into(),
     };
+    let push = pushed_m.map_or(String::new(), |most_m| {
+        format!("; a false torque may push the vehicle by {most_m} m")
+    });
     format!(
-        "Limits with these drivers: a deviation of {deviation_m} m; {share}. A motor that ignores the ECU and a driver who pulls the other \
-         way are not judged by them. Seeds from {} on.",
+        "Limits with these drivers: a deviation of {deviation_m} m; {share}{push}. Lies that little contradicts have a limit of their own. A \
+         motor that ignores the ECU and a driver who pulls the other way are not judged. Seeds from {} on.",
         campaign.first_seed
     )
 }
