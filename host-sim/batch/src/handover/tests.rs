@@ -101,11 +101,11 @@ fn the_larger_peak_without_a_failure_or_by_hand_is_what_counts() {
 }
 
 #[test]
-fn a_row_is_broken_beyond_five_percent_of_a_drop_or_by_a_drive_that_was_not_guided() {
+fn a_row_is_broken_well_beyond_a_drop_or_by_a_drive_that_was_not_guided() {
     for (handover_m, takes_over_after_s, is_broken) in [
-        (0.4199, 1.0, false),
-        (0.4201, 1.0, true),
-        (0.4201, 0.5, false),
+        (0.4799, 1.0, false),
+        (0.4801, 1.0, true),
+        (0.4801, 0.5, false),
         (0.1, 2.0, false),
     ] {
         let mut peaks = drives();
