@@ -40,7 +40,6 @@ static const double SPEED = 60.0 / 3.6;    /* m/s */
 static const double TORQUE_LIMIT = 5.0;    /* N.m, section 3.2 */
 static const double LANE_RATE = 120.0;     /* Hz, lane samples */
 static const double RATE_CORNER = 10.0;    /* Hz, low-pass on the differenced 120 Hz samples; our choice */
-static const double RESPONSE_TIME = 1.0;   /* s from a failure until the driver has the manual gains */
 static const double MANUAL_K_D = 4.0;      /* section 5.1 */
 static const double DIVERGED_BEYOND = 50.0; /* m off the centreline */
 
@@ -391,8 +390,8 @@ static double shipping_step(Shipping *e, Link *command, long k, double e_y, doub
 /* ---- the loop ---------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    double t_p, k_d, k_hg, failure_time, window_from, window_to, duration;
-    bool guidance, paper_sensors;
+    double t_p, k_d, k_hg, failure_time, takes_over, follow, hold, fall, window_from, window_to, duration;
+    bool guidance, paper_sensors, hands_over;
     long repeat;
     const char *trace;
 } Options;
@@ -417,6 +416,7 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
     Foot guide_near = foot_at(road, SPEED * GT_N), guide_far = foot_at(road, SPEED * GT_F);
     Link lane = open_link(0x11), column = open_link(0x22), command = open_link(0x5A);
     Law law = {0};
+    double held = 0; /* of a handover, before it falls */
 #ifdef SHIPPING_ECU
     Shipping shipping = {0};
     if (hg_ecu_init(&shipping.ecu, NULL, 1, 0, NULL) != HG_OK)
@@ -426,7 +426,7 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
     const long delay = (long)(o->t_p / TICK + 1e-9);
     const double part = o->t_p / TICK - (double)delay > 1e-9 ? o->t_p / TICK - (double)delay : 0.0;
     const long fails = isnan(o->failure_time) ? -1 : lround(o->failure_time / TICK);
-    const long responds = fails < 0 ? -1 : fails + lround(RESPONSE_TIME / TICK);
+    const long responds = fails < 0 ? -1 : fails + lround(o->takes_over / TICK);
     const long end = isnan(o->duration) ? -1 : lround(o->duration / TICK);
 
     for (long k = 0; k != end; k++) {
@@ -493,8 +493,14 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
                     r.rejected++;
                 r.frames += 2;
             }
-            if (fails < 0 || k < fails)
+            if (fails < 0 || k < fails) {
                 t_h = torque;
+            } else if (o->hands_over) {
+                const double since = (double)(k - fails) * TICK;
+                if (k == fails || since < o->follow)
+                    held = torque;
+                t_h = held * fmin(1, fmax(0, 1 - (since - o->hold) / o->fall));
+            }
         }
 
         if (body.s >= o->window_from && body.s <= o->window_to) {
@@ -533,7 +539,11 @@ static void usage(FILE *to)
           "  --k-d K            target angle to torque, N.m/rad (default 2)\n"
           "  --k-hg K           reaction to guidance, 0 to 1 (default 0)\n"
           "  --guidance on|off  (default on)\n"
-          "  --failure-time S   guidance torque drops to 0 here (default never)\n"
+          "  --failure-time S   guidance torque is lost here (default never)\n"
+          "  --fails torque|input  it drops to 0, or is handed over (default torque)\n"
+          "  --follow S --hold S --fall S  a handover follows the law so long (default 1), and falls to 0 over a time\n"
+          "                     (default 2) after it was held for one (default 0)\n"
+          "  --takes-over S     from then until the driver has the manual gains (default 1)\n"
           "  --sensors exact|paper  (default paper: 120 Hz, frames, filtered rates)\n"
           "  --window FROM TO   metrics over this stretch, m (default 1080 1740)\n"
           "  --duration S       stop early (default: the whole course)\n"
@@ -566,8 +576,10 @@ static Options parse(int argc, char **argv)
     static const struct option names[] = {
         {"t-p", 1, 0, 0},     {"k-d", 1, 0, 0},    {"k-hg", 1, 0, 0},   {"guidance", 1, 0, 0}, {"failure-time", 1, 0, 0},
         {"sensors", 1, 0, 0}, {"window", 1, 0, 0}, {"duration", 1, 0, 0}, {"repeat", 1, 0, 0},   {"trace", 1, 0, 0},
-        {"help", 0, 0, 0},    {0, 0, 0, 0}};
+        {"help", 0, 0, 0},    {"fails", 1, 0, 0},  {"takes-over", 1, 0, 0}, {"follow", 1, 0, 0},
+        {"hold", 1, 0, 0},    {"fall", 1, 0, 0},   {0, 0, 0, 0}};
     Options o = {.t_p = 0.3, .k_d = 2, .k_hg = 0, .guidance = true, .paper_sensors = true, .failure_time = NAN,
+                 .takes_over = 1, .follow = 1, .fall = 2,
                  .window_from = 1080, .window_to = 1740, .duration = NAN, .repeat = 1};
     int at;
     for (int got; (got = getopt_long(argc, argv, "", names, &at)) != -1;) {
@@ -594,6 +606,11 @@ static Options parse(int argc, char **argv)
         case 7: o.duration = number(n, optarg, TICK, 1e4); break;
         case 8: o.repeat = (long)number(n, optarg, 1, 1e6); break;
         case 9: o.trace = optarg; break;
+        case 11: o.hands_over = choice(n, optarg, "input", "torque"); break;
+        case 12: o.takes_over = number(n, optarg, 0, 10); break;
+        case 13: o.follow = number(n, optarg, 0, 10); break;
+        case 14: o.hold = number(n, optarg, 0, 10); break;
+        case 15: o.fall = number(n, optarg, TICK, 10); break;
         default: usage(stdout); exit(0);
         }
     }

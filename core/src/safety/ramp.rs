@@ -1,17 +1,16 @@
 //! Ramps that take the last trusted torque to zero.
 //!
-//! A sudden loss of guidance in a curve takes a relying driver 0.44 to 0.62 m off the centreline; the same
-//! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/decisions has the
-//! table). Where the driver pushes against the torque, the ramp is faster. No ramp
-//! ever grows.
+//! A sudden loss of guidance as a curve begins takes a relying driver 0.44 to 0.62 m off the centreline; the same
+//! torque faded over 2 s while the driver takes over keeps the peak near what it was. Elsewhere in a curve, and for
+//! drivers who take over sooner or later, a fade is worth less (docs/decisions/001). Where the driver pushes against
+//! the torque, the ramp is faster. No ramp ever grows.
 
 use fixed::types::I8F24;
 
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, share_of, signed_quotient};
 use crate::safety::redundant::words;
 
-/// How long a handover lasts. With 0.12 s the vehicle goes almost as far as after a sudden loss; with 3 s it
-/// overshoots.
+/// How long a handover lasts. With 1 s it costs more in an arc, with 3 s more as an arc ends.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
 /// How long a handover lasts at least after the lane was extrapolated.
 pub const GONE_ON: Micros = Micros::from_ms(1000);

@@ -1,21 +1,39 @@
 //! `host-sim handover`.
 
 use clap::Args;
-use haptic_batch::handover::{HandoverRow, ROWS, study};
+use haptic_batch::handover::{EVERY_S, HandoverRow, drives, study};
 use haptic_report::studies::handover::report;
 
+use super::progress::Threads;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
+    /// Spacing of the instants at which the input is lost, 0.05 to 5
+    #[arg(long, value_name = "S", default_value_t = EVERY_S, value_parser = seconds)]
+    every: f64,
+    #[command(flatten)]
+    threads: Threads,
     #[command(flatten)]
     results: ResultArguments,
 }
 
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|_| "no number".to_owned())?;
+    if (0.05..=5.0).contains(&seconds) {
+        Ok(seconds)
+    } else {
+        Err("not from 0.05 to 5 s".into())
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("handover")?;
-    let results = progress::over(ROWS as u64, "rows", |done| study(done))?;
+    let every_s = arguments.every;
+    let results = progress::over(drives(every_s) as u64, "drives", |done| {
+        arguments.threads.run(|| study(every_s, done))
+    })??;
     let holds = !results.rows.iter().any(HandoverRow::is_broken);
     output.show(&report(&results), &results, holds)
 }

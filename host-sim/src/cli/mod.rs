@@ -118,7 +118,7 @@ enum Command {
     ///
     /// Many cars drive for hours.
     Availability(availability::Arguments),
-    /// What a lost input costs with a handover within 2 s, and without: 40 to 120 km/h
+    /// What a lost input costs with a handover, and without: every instant of bends
     Handover(handover::Arguments),
     /// How well the ECU estimates while it drives how much a driver relies on it (K_hg)
     Reliance(reliance::Arguments),

@@ -280,6 +280,7 @@ fn supported_driver(driver: &DriverParameters, gains: ArmGains, change: Option<D
         remnant_sd_nm: _,
         remnant_corner_hz: _,
         answers_hands_off_after_s: _,
+        takes_over_after_s: _,
         line_m: _,
     } = driver;
     let ArmGains { k_d: _, k_hg: _ } = gains;

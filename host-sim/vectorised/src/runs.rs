@@ -23,7 +23,7 @@ use haptic_sim::models::road::Centreline;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::{STEP_S, STEPS_PER_SECOND, step_of, wrapped};
 use haptic_sim::parts::{ByReliance, DriverVehicle, PaperPair};
-use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
+use haptic_sim::scenario::{FailureKind, Scenario};
 use haptic_sim::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Sensing};
 use haptic_sim::unguided::Cause;
 
@@ -52,6 +52,8 @@ struct Slot {
     is_whole: bool,
     /// The next step in which something is planned.
     event: u32,
+    /// The step in which the driver takes over.
+    noticed: u32,
     /// The step in which a lane preview that fails ends guidance.
     timeout: u32,
 }
@@ -106,6 +108,7 @@ impl<const N: usize> Runs<N> {
                 unguided_cause: 0.0,
                 is_whole: false,
                 event: u32::MAX,
+                noticed: u32::MAX,
                 timeout: u32::MAX,
             }),
         }
@@ -135,14 +138,15 @@ impl<const N: usize> Runs<N> {
         slot.scenario = Some(number);
         slot.unguided_cause = 0.0;
         slot.is_whole = false;
+        let [failed_at, _] = plan.failure_steps;
+        slot.noticed = failed_at.saturating_add(step_of(scenario.driver().takes_over_after_s));
         slot.timeout = u32::MAX;
         let mut coast = None;
         if failure.kind == FailureKind::Input {
-            let failure_step = plan.failure_steps[0];
-            let last = (0..failure_step).rev().find(|step| camera_looks(*step));
+            let last = (0..failed_at).rev().find(|step| camera_looks(*step));
             let lost = last.map_or(0, |last| last + TIMEOUT_MS);
             slot.timeout = lost + BLIND_MS;
-            coast = Some(Coast::new(scenario.setup().config, failure_step, lost));
+            coast = Some(Coast::new(scenario.setup().config, failed_at, lost));
         }
         self.ecus.will_lose(lane, coast);
         slot.remnant = (scenario.driver().remnant_sd_nm != 0.0).then_some(pair.remnant);
@@ -159,8 +163,7 @@ impl<const N: usize> Runs<N> {
         let slot = &mut self.slots[lane];
         let Some((plan, arm)) = &slot.plan else { return };
         let faults = plan.faults(step);
-        let [failed_at, _] = plan.failure_steps;
-        let noticed = failed_at.saturating_add(step_of(FAILURE_REACTION_S));
+        let ([failed_at, _], noticed) = (plan.failure_steps, slot.noticed);
         self.worlds.set_transition(lane, arm.at(step, step >= noticed));
         if faults.torque_lost {
             self.ecus.lose_torque(lane);

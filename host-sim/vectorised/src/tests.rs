@@ -143,7 +143,7 @@ fn random(count: usize, seed: u64, beside: Beside) -> Vec<Scenario> {
     let mut scenarios = Vec::new();
     while scenarios.len() < count {
         let mut between = |from: f64, to: f64| from + (to - from) * random.random::<f64>();
-        let driver = DriverParameters {
+        let mut driver = DriverParameters {
             a_1: between(0.05, 0.3),
             a_2: between(0.0, 0.06),
             a_3: between(2.0, 4.0),
@@ -153,6 +153,7 @@ fn random(count: usize, seed: u64, beside: Beside) -> Vec<Scenario> {
             remnant_sd_nm: (between(-0.1, 0.2)).max(0.0),
             ..DriverParameters::default()
         };
+        driver.takes_over_after_s = 10.0 * driver.t_p;
         let kind = [FailureKind::None, FailureKind::Torque, FailureKind::Input][between(0.0, 3.0) as usize];
         let time_s = between(2.0, 20.0);
         let change = DriverChange {

@@ -42,6 +42,7 @@ class DriverTable(TypedDict, total=False):
     remnant_sd_nm: float
     remnant_corner_hz: float
     answers_hands_off_after_s: float
+    takes_over_after_s: float
     line_m: float
     k_d_nm_per_rad: float
     k_hg: float

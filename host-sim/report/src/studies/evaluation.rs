@@ -186,13 +186,15 @@ pub fn report(evaluation: &Evaluation) -> Report {
     };
     let [from, to] = results.window_m;
     let nominal = "Lateral error from the centreline, left positive, without failure.";
+    let after_s = first.map_or(f64::NAN, |(scenario, _)| scenario.driver().takes_over_after_s);
     let lost = format!(
-        "The guidance torque drops to zero at {failure_s} s; one second later the driver steers as manually. The manual run has \
+        "The guidance torque drops to zero at {failure_s} s; {after_s} s later the driver steers as manually. The manual run has \
          no failure and is drawn for comparison."
     );
     let handed_over = format!(
         "Torque lost: it drops to zero at {failure_s} s. Handed over: the lane preview stops at {failure_s} s, and the ECU takes \
-         its last trusted torque to zero over 2 s. One second after either the driver steers as manually."
+         the torque to zero over 2 s. {after_s} s after either the driver steers as manually. Other instants cost more: `host-sim \
+         handover` has the worst."
     );
     let figure = |name, figure, caption| vec![Block::figure(name, figure, caption)];
     // So many at a time that paper can hold the table.

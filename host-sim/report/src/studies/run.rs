@@ -13,7 +13,7 @@ use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::trace::Sample;
 use haptic_log::{Event, candump};
-use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind};
+use haptic_sim::scenario::FailureKind;
 use haptic_sim::simulation::Ending;
 
 /// Writes the time series if they are asked for, and the bus if it was recorded (as `candump -L` does).
@@ -176,7 +176,7 @@ fn events(single: &SingleRun) -> Vec<Event> {
             FailureKind::Torque | FailureKind::None => "The guidance torque drops to zero",
         };
         events.push(event(time_s, what.into()));
-        let noticed_s = time_s + FAILURE_REACTION_S;
+        let noticed_s = time_s + single.scenario.driver().takes_over_after_s;
         if noticed_s <= end_s {
             events.push(event(noticed_s, "The driver steers as manually".into()));
         }

@@ -39,6 +39,9 @@ fields! {
         /// fro, with 0.2 N.m over 1 s; `inf`: never. Our own choice, and so late that only drives differ in which guidance
         /// would end
         answers_hands_off_after_s: f64 = 14.0, "answers_hands_off_after_s", "", "s", Between(0.0, f64::INFINITY);
+        /// how long after a loss of torque or lane preview the driver drives as manually (section 5.2: 1 s), and how long after
+        /// its end the driver relies on guidance again
+        takes_over_after_s: f64 = 1.0, "takes_over_after_s", "", "s", Between(0.0, 10.0);
         /// the driver's own line, left of the lane's middle
         line_m: f64 = 0.0, "line_m", "", "m", Between(-2.0, 2.0);
     }

@@ -32,7 +32,7 @@ pub struct DriverView {
     pub warning: bool,
     /// Whether the ECU guides and asks for a hand on the wheel, which it does not feel; the lamp is on then too.
     pub asks_for_hands: bool,
-    /// Whether the scenario or an action takes torque or lane preview away. The paper's driver knows it a second later; one
+    /// Whether the scenario or an action takes torque or lane preview away. The paper's driver knows it some time later; one
     /// who has only eyes and hands leaves it unread.
     pub is_lost: bool,
 }
@@ -100,7 +100,7 @@ impl PaperDriver {
             arm: Arm::new(driver, scenario.gains()),
             torque_nm: 0.0,
             gains: ByReliance::new(scenario, |gains| gains),
-            notices: Notices::default(),
+            notices: Notices::new(driver),
             answer: HandsAnswer::new(driver),
         }
     }

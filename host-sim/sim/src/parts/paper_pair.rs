@@ -7,7 +7,7 @@ use crate::models::nonlinear::NonlinearPlant;
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::step_of;
 use crate::models::tolerances::Car;
-use crate::scenario::{FAILURE_REACTION_S, Scenario};
+use crate::scenario::Scenario;
 use crate::seeds::Stream;
 
 /// The driver of equations (7) and (8) whose arm is a state of the vehicle's plant: the exact step of the linear one, or
@@ -67,7 +67,7 @@ impl PaperPair {
             vision: Vision::new(driver),
             remnant: Remnant::new(driver, Stream::Remnant.seed(scenario.seed())),
             arm,
-            notices: Notices::default(),
+            notices: Notices::new(driver),
             answer: HandsAnswer::new(driver),
             takes_over: false,
             step: 0,
@@ -214,20 +214,30 @@ impl<T> ByReliance<T> {
     }
 }
 
-/// A driver who notices a second later that the guidance is lost, and as much later that it is back.
-#[derive(Debug, Clone, Default)]
+/// A driver who notices after a time that the guidance is lost, and as much later that it is back.
+#[derive(Debug, Clone)]
 pub(crate) struct Notices {
+    /// The time, in steps.
+    after: u32,
     is_manual: bool,
     /// Steps for which it has been otherwise than the driver believes.
     unnoticed: u32,
 }
 
 impl Notices {
+    pub(crate) fn new(driver: &DriverParameters) -> Self {
+        Self {
+            after: step_of(driver.takes_over_after_s),
+            is_manual: false,
+            unnoticed: 0,
+        }
+    }
+
     #[inline]
     pub(crate) fn step(&mut self, is_lost: bool) {
         if is_lost == self.is_manual {
             self.unnoticed = 0;
-        } else if self.unnoticed == step_of(FAILURE_REACTION_S) {
+        } else if self.unnoticed == self.after {
             (self.is_manual, self.unnoticed) = (is_lost, 0);
         } else {
             self.unnoticed += 1;

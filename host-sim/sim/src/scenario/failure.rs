@@ -10,8 +10,6 @@ use crate::models::{STEP_S, step_of};
 
 /// When the paper lets the guidance fail, s.
 pub const DEFAULT_FAILURE_TIME_S: f64 = 70.0;
-/// How long the driver takes to notice a failure, s (section 5.2).
-pub const FAILURE_REACTION_S: f64 = 1.0;
 
 /// What fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -43,9 +41,9 @@ fields! {
     Failure, "failure" {
         /// what fails: nothing, the torque drops to zero, or the lane preview stops and the ECU hands over
         kind: FailureKind = FailureKind::None, "kind", "", "", OneOf(&["none", "torque", "input"]);
-        /// when, before the run ends; one second later the driver has `driver.manual_k_d_nm_per_rad`
+        /// when, before the run ends; `driver.takes_over_after_s` later the driver has `driver.manual_k_d_nm_per_rad`
         time_s: f64 = DEFAULT_FAILURE_TIME_S, "time_s", "", "s", Between(0.0, 1e6);
-        /// for how long; without it until the run ends. A second after its end the driver relies on guidance again, and asks
+        /// for how long; without it until the run ends. As long after its end the driver relies on guidance again, and asks
         /// for it anew where the ECU has handed over
         duration_s: Option<f64> = None, "duration_s", "", "s", Between(STEP_S, 1e6);
     }

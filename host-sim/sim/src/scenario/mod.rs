@@ -20,7 +20,7 @@ use haptic_core::controller::params::Params;
 
 pub use builder::{ScenarioBuilder, ScenarioError};
 pub use condition::{Condition, Sensors};
-pub use failure::{DEFAULT_FAILURE_TIME_S, DriverChange, FAILURE_REACTION_S, Failure, FailureKind};
+pub use failure::{DEFAULT_FAILURE_TIME_S, DriverChange, Failure, FailureKind};
 pub use file::{FieldsOf, TABLES, fields_of, unit_of};
 pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_M_PER_S, SPEED_M_PER_S, Speed, SpeedProfile};
 pub use values::{GuidanceParameters, ScenarioValues};
