@@ -26,11 +26,13 @@ pub(crate) fn command(program: &str) -> Command {
 }
 
 /// How everything that is tested is built: one profile and one set of features, so that nothing is compiled twice.
-pub(crate) const SHAPE: [&str; 6] = [
+pub(crate) const SHAPE: [&str; 8] = [
     "--release",
     "--workspace",
     "--exclude",
     "xtask",
+    "--exclude",
+    "xtask-log",
     "--features",
     "host-sim/mcap",
 ];
