@@ -18,8 +18,8 @@ use crate::boards::Board;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
-    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, profiles, python, trace,
-    venv, web, wheel,
+    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, policy, profiles, python,
+    trace, venv, web, wheel,
 };
 
 /// Which stages run.
@@ -87,6 +87,8 @@ const STAGES: &[Stage] = stages! {
     "bindings-agree" Beside "the same frames from every binding": || bindings_agree::check(Built::ForTests);
     "requirements" Beside "every requirement has its evidence": || trace::run(false);
     "xtask" Beside "tests of xtask itself": xtask_tests;
+    "dependencies" Beside "licences, bans and sources of dependencies": policy::dependencies;
+    "workflows" Beside "the workflows of hosted CI": policy::workflows;
     "all-boards" Full "the same of all boards, the real ones' images among them":
         || boards::check(boards::Scope::All, Built::ForTests, false);
     "wheel" Full "the wheel as it is handed on, installed and tested":

@@ -6,6 +6,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use crate::dist;
+
 /// The workspace's root.
 pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -34,47 +36,49 @@ pub(crate) const SHAPE: [&str; 8] = [
     "--exclude",
     "xtask-log",
     "--features",
-    "host-sim/mcap",
+    ALL_FORMATS,
 ];
+
+/// What the command line can read and write beyond what the first command builds.
+pub(crate) const ALL_FORMATS: &str = "host-sim/mcap";
 
 /// Which build of a binding is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Built {
     /// With everything else, as [`SHAPE`] has it: in CI it is there already.
     ForTests,
-    /// By itself, in the profile `dist`: what is handed on.
+    /// By itself, in the profile `dist` and for an old glibc: what is handed on.
     ToShip,
 }
 
 impl Built {
     /// Builds a package for this computer; the directory of its libraries and programs.
     pub(crate) fn package(self, name: &str) -> Result<PathBuf> {
-        let mut build = cargo();
-        build.args(["build", "-q"]);
-        let place = match self {
-            Self::ForTests => {
-                // With the tests, whose dependencies switch on features of what the rest depends on too.
-                build.args(SHAPE).arg("--all-targets");
-                "release"
-            }
-            Self::ToShip => {
-                build.args(["--profile", "dist", "-p", name]);
-                "dist"
-            }
-        };
-        run(&mut build)?;
-        Ok(root().join("target").join(place))
+        if self == Self::ToShip {
+            return dist::build(name, "");
+        }
+        // With the tests, whose dependencies switch on features of what the rest depends on too.
+        run(cargo().args(["build", "-q"]).args(SHAPE).arg("--all-targets"))?;
+        Ok(root().join("target/release"))
     }
 
-    /// The command line. Nothing of it is handed on, so that its own profile is for daily work.
+    /// The command line to check others with: that of daily work, which computes the same bits as the one that is handed on.
     pub(crate) fn host_sim(self) -> Result<PathBuf> {
-        if self == Self::ToShip {
-            run(cargo().args(["build", "-q", "--release", "-p", "host-sim"]))?;
-            return Ok(root().join("target/release/host-sim"));
+        match self {
+            Self::ForTests => Ok(self.package("host-sim")?.join("host-sim")),
+            Self::ToShip => daily_host_sim(),
         }
-        Ok(self.package("host-sim")?.join("host-sim"))
     }
 }
+
+/// The command line as the first command of the README builds it.
+pub(crate) fn daily_host_sim() -> Result<PathBuf> {
+    run(cargo().args(["build", "-q", "--release", "-p", "host-sim"]))?;
+    Ok(root().join("target/release").join(HOST_SIM))
+}
+
+/// The command line's file.
+pub(crate) const HOST_SIM: &str = if cfg!(windows) { "host-sim.exe" } else { "host-sim" };
 
 /// Runs a program whose output the user sees.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
