@@ -47,6 +47,8 @@ pub(crate) const ALL_FORMATS: &str = "host-sim/mcap";
 pub(crate) enum Built {
     /// With everything else, as [`SHAPE`] has it: in CI it is there already.
     ForTests,
+    /// By itself, in the profile of the tests: as the README's first command builds it.
+    Daily,
     /// By itself, in the profile `dist` and for an old glibc: what is handed on.
     ToShip,
 }
@@ -54,27 +56,25 @@ pub(crate) enum Built {
 impl Built {
     /// Builds a package for this computer; the directory of its libraries and programs.
     pub(crate) fn package(self, name: &str) -> Result<PathBuf> {
-        if self == Self::ToShip {
-            return dist::build(name, "");
+        let mut build = cargo();
+        build.args(["build", "-q"]);
+        match self {
+            // With the tests, whose dependencies switch on features of what the rest depends on too.
+            Self::ForTests => run(build.args(SHAPE).arg("--all-targets"))?,
+            Self::Daily => run(build.args(["--release", "-p", name]))?,
+            Self::ToShip => return dist::build(name, ""),
         }
-        // With the tests, whose dependencies switch on features of what the rest depends on too.
-        run(cargo().args(["build", "-q"]).args(SHAPE).arg("--all-targets"))?;
         Ok(root().join("target/release"))
     }
 
     /// The command line to check others with: that of daily work, which computes the same bits as the one that is handed on.
     pub(crate) fn host_sim(self) -> Result<PathBuf> {
-        match self {
-            Self::ForTests => Ok(self.package("host-sim")?.join("host-sim")),
-            Self::ToShip => daily_host_sim(),
-        }
+        let built = match self {
+            Self::ForTests => self,
+            Self::Daily | Self::ToShip => Self::Daily,
+        };
+        Ok(built.package("host-sim")?.join(HOST_SIM))
     }
-}
-
-/// The command line as the first command of the README builds it.
-pub(crate) fn daily_host_sim() -> Result<PathBuf> {
-    run(cargo().args(["build", "-q", "--release", "-p", "host-sim"]))?;
-    Ok(root().join("target/release").join(HOST_SIM))
 }
 
 /// The command line's file.

@@ -42,7 +42,7 @@ pub(crate) fn pack(built: Built) -> Result<PathBuf> {
 
 fn build(built: Built) -> Result<PathBuf> {
     let profile = match built {
-        Built::ForTests => "release",
+        Built::ForTests | Built::Daily => "release",
         Built::ToShip => "page",
     };
     let mut build = cargo();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
-use crate::tool::{ALL_FORMATS, HOST_SIM, cargo, command, daily_host_sim, llvm, output, root, run};
+use crate::tool::{ALL_FORMATS, Built, HOST_SIM, cargo, command, llvm, output, root, run};
 use crate::{dist, venv};
 
 /// What `cargo xtask wheel` is asked for.
@@ -115,7 +115,7 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
         }
         dist::prepare(&mut maturin)?;
     } else {
-        std::fs::copy(daily_host_sim()?, &program)?;
+        std::fs::copy(Built::Daily.host_sim()?, &program)?;
         run(llvm("llvm-strip")?.arg(&program))?;
         maturin.args(["--profile", "release"]);
         if cfg!(target_os = "linux") {

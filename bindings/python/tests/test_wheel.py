@@ -1,6 +1,8 @@
 """What is installed: small, typed, and without what does not belong into somebody else's process."""
 
 import importlib.metadata
+import subprocess
+import sysconfig
 from pathlib import Path
 
 import pytest
@@ -32,6 +34,12 @@ def test_no_injector_no_serial_port_no_charts():
     for name in NOT_LINKED:
         assert name not in library, name
     assert not hasattr(hg._native, "inject")
+
+
+def test_the_command_line_is_a_program_of_the_environment():
+    program = Path(sysconfig.get_path("scripts")) / f"host-sim{sysconfig.get_config_var('EXE')}"
+    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True, env={}).stdout
+    assert said.split() == ["host-sim", importlib.metadata.version("haptic-guidance")]
 
 
 def test_gymnasium_and_the_rest_are_optional():

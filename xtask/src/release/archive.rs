@@ -68,3 +68,33 @@ pub(super) fn unpack(file: &Path, place: &Path) -> Result<()> {
         .unpack(place)
         .with_context(|| file.display().to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    use super::{Entry, pack};
+
+    /// Python's tarfile, and not our reader, says what is in it.
+    #[test]
+    fn an_archive_is_sorted_of_nobody_and_the_same_every_time() {
+        let place = std::env::temp_dir().join(format!("haptic-archive-{}", std::process::id()));
+        std::fs::create_dir_all(&place).unwrap();
+        let [one, other] = ["one.tar.gz", "other.tar.gz"].map(|name| place.join(name));
+        let [first, second] = [|| Entry::new("b/text", "words"), || {
+            Entry::new("a", "x").program()
+        }];
+        pack(&one, "top", vec![first(), second()]).unwrap();
+        pack(&other, "top", vec![second(), first()]).unwrap();
+        assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());
+        let list = "import sys, tarfile\nfor m in tarfile.open(sys.argv[1]): print(m.name, oct(m.mode), m.uid, m.uname, m.size)";
+        let said = Command::new("python3")
+            .args(["-c", list])
+            .arg(&one)
+            .output()
+            .unwrap();
+        std::fs::remove_dir_all(&place).unwrap();
+        let said = String::from_utf8(said.stdout).unwrap();
+        assert_eq!(said, "top/a 0o755 0  1\ntop/b/text 0o644 0  5\n");
+    }
+}

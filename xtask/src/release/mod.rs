@@ -116,7 +116,7 @@ pub(crate) fn make(options: &Options) -> Result<()> {
         return twice::compare(&options.only);
     }
     let (built, name) = if options.dry_run {
-        (Built::ForTests, "handed-on-dry-run")
+        (Built::Daily, "handed-on-dry-run")
     } else {
         (Built::ToShip, "handed-on")
     };
@@ -176,7 +176,7 @@ fn make_part(part: Part, release: &Release) -> Result<()> {
             // With its verification: what is packed builds by itself. A dry run may be of what is not committed yet.
             let mut package = cargo();
             package.args(["package", "-q", "-p", "haptic-core"]);
-            if release.built == Built::ForTests {
+            if release.built != Built::ToShip {
                 package.arg("--allow-dirty");
             }
             run(&mut package)?;

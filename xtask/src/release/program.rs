@@ -9,14 +9,14 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::archive::{self, Entry};
 use super::{Part, Release, copy_into};
-use crate::tool::{ALL_FORMATS, Built, HOST_SIM, command, daily_host_sim, llvm, output, root, run};
+use crate::tool::{ALL_FORMATS, Built, HOST_SIM, command, llvm, output, root, run};
 use crate::{dist, venv, wheel};
 
 /// The archive: program, examples, and a page that says what to do first.
 pub(super) fn archive(release: &Release) -> Result<()> {
     let program = match release.built {
         Built::ToShip => dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM),
-        Built::ForTests => stripped(&daily_host_sim()?)?,
+        Built::ForTests | Built::Daily => stripped(&Built::Daily.host_sim()?)?,
     };
     let name = format!("haptic-guidance-{}-{}", release.version, release.host);
     let mut entries = vec![
