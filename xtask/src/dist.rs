@@ -70,6 +70,16 @@ pub(crate) fn prepare(build: &mut Command) -> Result<()> {
     Ok(())
 }
 
+/// A copy of a library or program without symbols, which Zig leaves whatever the compiler asks for.
+pub(crate) fn stripped(file: &Path) -> Result<PathBuf> {
+    let copy = file.with_extension("stripped");
+    std::fs::copy(file, &copy).with_context(|| file.display().to_string())?;
+    if cfg!(target_os = "linux") {
+        run(tool::llvm("llvm-strip")?.arg(&copy))?;
+    }
+    Ok(copy)
+}
+
 /// The compiler's options that put names in the place of this machine's folders.
 pub(crate) fn remapped() -> Result<[String; 2]> {
     let [crates, here] = [crates()?, root().to_owned()].map(|folder| folder.display().to_string());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
-use crate::tool::{ALL_FORMATS, Built, HOST_SIM, cargo, command, llvm, output, root, run};
+use crate::tool::{ALL_FORMATS, Built, HOST_SIM, cargo, command, output, root, run};
 use crate::{dist, venv};
 
 /// What `cargo xtask wheel` is asked for.
@@ -47,7 +47,7 @@ const NOT_IN_A_WHEEL: [&str; 10] = [
     "clap",
     "indicatif",
 ];
-const LARGEST_MB: f64 = 15.0;
+const LARGEST_MB: f64 = 20.0;
 /// What maturin packs into a wheel beside the module: its folder `scripts` is installed among the programs.
 const DATA: &str = "bindings/python/haptic_guidance.data";
 
@@ -107,7 +107,8 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
         .args("build -m bindings/python/Cargo.toml --out".split(' '))
         .arg(dist);
     if to_ship {
-        std::fs::copy(dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM), &program)?;
+        let built = dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM);
+        std::fs::copy(dist::stripped(&built)?, &program)?;
         let host = dist::host()?;
         maturin.args(["--profile", "dist", "--target", &host]);
         if dist::has_glibc(&host) {
@@ -115,8 +116,7 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
         }
         dist::prepare(&mut maturin)?;
     } else {
-        std::fs::copy(Built::Daily.host_sim()?, &program)?;
-        run(llvm("llvm-strip")?.arg(&program))?;
+        std::fs::copy(dist::stripped(&Built::Daily.host_sim()?)?, &program)?;
         maturin.args(["--profile", "release"]);
         if cfg!(target_os = "linux") {
             // No promise to other computers.

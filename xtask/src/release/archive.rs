@@ -81,9 +81,10 @@ mod tests {
         let place = std::env::temp_dir().join(format!("haptic-archive-{}", std::process::id()));
         std::fs::create_dir_all(&place).unwrap();
         let [one, other] = ["one.tar.gz", "other.tar.gz"].map(|name| place.join(name));
-        let [first, second] = [|| Entry::new("b/text", "words"), || {
-            Entry::new("a", "x").program()
-        }];
+        let [first, second] = [
+            || Entry::new("b/text", "words"),
+            || Entry::new("a", "x").program(),
+        ];
         pack(&one, "top", vec![first(), second()]).unwrap();
         pack(&other, "top", vec![second(), first()]).unwrap();
         assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());

@@ -241,3 +241,33 @@ fn sum(place: &Path) -> Result<()> {
 }
 
 const SUMS: &str = "SHA256SUMS";
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use crate::tool::{cargo, output};
+
+    /// What a registry shows of a package; only the controller goes to one.
+    #[test]
+    fn every_manifest_says_what_it_is_and_only_core_is_published() {
+        let said = output(cargo().args("metadata --no-deps --format-version 1 --locked".split(' '))).unwrap();
+        let metadata: Value = serde_json::from_str(&said).unwrap();
+        let packages = metadata["packages"].as_array().unwrap();
+        assert!(packages.len() > 15, "{}", packages.len());
+        for package in packages {
+            let name = &package["name"];
+            for field in ["description", "license", "repository", "rust_version"] {
+                assert!(package[field].is_string(), "{name}: no {field}");
+            }
+            let has_readme = package["readme"].is_string();
+            assert!(has_readme, "{name}: no README.md");
+            for list in ["keywords", "categories"] {
+                let count = package[list].as_array().unwrap().len();
+                assert!((1..=5).contains(&count), "{name}: {count} {list}");
+            }
+            let is_published = package["publish"].is_null();
+            assert_eq!(is_published, name == "haptic-core", "{name}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! The command line, in an archive and in the wheel; both tried where nothing of the checkout is on the path.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
@@ -16,11 +16,11 @@ use crate::{dist, venv, wheel};
 pub(super) fn archive(release: &Release) -> Result<()> {
     let program = match release.built {
         Built::ToShip => dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM),
-        Built::ForTests | Built::Daily => stripped(&Built::Daily.host_sim()?)?,
+        Built::ForTests | Built::Daily => Built::Daily.host_sim()?,
     };
     let name = format!("haptic-guidance-{}-{}", release.version, release.host);
     let mut entries = vec![
-        Entry::read(&program, HOST_SIM)?.program(),
+        Entry::read(&dist::stripped(&program)?, HOST_SIM)?.program(),
         Entry::read(&root().join("xtask/src/release/README.txt"), "README.txt")?,
         Entry::read(&root().join("core/haptic.dbc"), "haptic.dbc")?,
         // A drive to identify.
@@ -59,12 +59,6 @@ pub(super) fn wheel(release: &Release) -> Result<()> {
     let program = programs.join(HOST_SIM);
     old_enough(&program, release)?;
     evaluate(&program, &place)
-}
-
-fn stripped(program: &Path) -> Result<PathBuf> {
-    let stripped = program.with_file_name("host-sim-stripped");
-    run(llvm("llvm-strip")?.arg(program).arg("-o").arg(&stripped))?;
-    Ok(stripped)
 }
 
 /// The newest glibc that a program asks for is as old as was promised.
