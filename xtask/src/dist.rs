@@ -10,7 +10,7 @@ use crate::venv;
 
 /// The oldest glibc that what is handed on runs with: that of the wheels called manylinux2014.
 pub(crate) const GLIBC: (u32, u32) = (2, 17);
-/// Zig links against the glibc that it is told, and Cargo's plugin tells it.
+/// Zig links against the glibc that it is told; Cargo's plugin for it knows which of the compiler's options Zig does not.
 const TOOLS: [&str; 3] = [
     "maturin>=1.9,<2",
     "cargo-zigbuild>=0.24,<0.25",
@@ -39,38 +39,50 @@ pub(crate) fn tools() -> Result<PathBuf> {
 /// Builds a package for this computer, in the profile `dist`; the directory of its libraries and programs.
 pub(crate) fn build(package: &str, features: &str) -> Result<PathBuf> {
     let host = host()?;
-    let mut build = if has_glibc(&host) {
-        let mut zig = command(&tools()?.join("cargo-zigbuild").to_string_lossy());
-        let (major, minor) = GLIBC;
-        zig.args(["zigbuild", "--target", &format!("{host}.{major}.{minor}")]);
-        zig
-    } else {
-        let mut build = tool::cargo();
-        build.args(["build", "--target", &host]);
-        build
-    };
+    let mut build = tool::cargo();
     prepare(&mut build)?;
-    run(build.args(["--profile", "dist", "-p", package, "--features", features]))?;
+    run(build
+        .args(["build", "--profile", "dist", "--target", &host])
+        .args(["-p", package, "--features", features]))?;
     Ok(root().join("target").join(host).join("dist"))
 }
 
 /// Lets a command of Cargo or maturin build to the same bytes wherever and whenever: without symbols, without this machine's
-/// folders, and with the last commit's time for its own.
+/// folders, with the last commit's time for its own, and for the old glibc.
 pub(crate) fn prepare(build: &mut Command) -> Result<()> {
     build
         .env("RUSTFLAGS", remapped()?.join(" "))
         .env("CARGO_PROFILE_DIST_STRIP", "symbols")
+        .env("CARGO_PROFILE_DIST_DEBUG", "none")
         .env("SOURCE_DATE_EPOCH", commit_time()?.to_string());
-    if has_glibc(&host()?) {
-        // The plugin asks the first Python on the path for Zig.
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let folders = std::iter::once(tools()?).chain(std::env::split_paths(&path));
-        build.env("PATH", std::env::join_paths(folders)?);
+    let host = host()?;
+    if has_glibc(&host) {
+        let name = host.to_uppercase().replace('-', "_");
+        build.env(format!("CARGO_TARGET_{name}_LINKER"), linker(&host)?);
     }
     Ok(())
 }
 
-/// A copy of a library or program without symbols, which Zig leaves whatever the compiler asks for.
+/// A script that has Zig link. Commands of the plugin and of maturin do it too, but each names a linker of its own, and for another
+/// linker Cargo compiles everything anew.
+fn linker(host: &str) -> Result<PathBuf> {
+    let tools = tools()?;
+    let (major, minor) = GLIBC;
+    let processor = host.split('-').next().unwrap_or_default();
+    let text = format!(
+        "#!/bin/sh\nPATH=\"{0}:$PATH\" exec \"{0}/cargo-zigbuild\" zig cc -- -target {processor}-linux-gnu.{major}.{minor} \"$@\"\n",
+        tools.display()
+    );
+    let script = root().join("target/python/zig-cc");
+    if std::fs::read_to_string(&script).is_ok_and(|there| there == text) {
+        return Ok(script);
+    }
+    std::fs::write(&script, text).with_context(|| script.display().to_string())?;
+    run(command("chmod").arg("+x").arg(&script))?;
+    Ok(script)
+}
+
+/// A copy of a program without symbols, where the profile of the tests leaves them.
 pub(crate) fn stripped(file: &Path) -> Result<PathBuf> {
     let copy = file.with_extension("stripped");
     std::fs::copy(file, &copy).with_context(|| file.display().to_string())?;

@@ -39,8 +39,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
 
 /// The binaries that can be built here, with where each standard wants them and the extension.
 fn binaries(native: &Path) -> Result<Vec<(PathBuf, [&'static str; 2], &'static str)>> {
-    let linux = dist::stripped(&native.join("libhaptic_fmu.so"))?;
-    let linux = (linux, ["linux64", "x86_64-linux"], "so");
+    let linux = (native.join("libhaptic_fmu.so"), ["linux64", "x86_64-linux"], "so");
     let mut made = vec![linux];
     let targets = output(command("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
     if targets.lines().any(|line| line == WINDOWS) && exists(LINKER) {

@@ -108,11 +108,11 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
         .arg(dist);
     if to_ship {
         let built = dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM);
-        std::fs::copy(dist::stripped(&built)?, &program)?;
+        std::fs::copy(built, &program)?;
         let host = dist::host()?;
         maturin.args(["--profile", "dist", "--target", &host]);
         if dist::has_glibc(&host) {
-            maturin.args(["--zig", "--compatibility", "manylinux2014"]);
+            maturin.args(["--compatibility", "manylinux2014"]);
         }
         dist::prepare(&mut maturin)?;
     } else {

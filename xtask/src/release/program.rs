@@ -16,11 +16,11 @@ use crate::{dist, venv, wheel};
 pub(super) fn archive(release: &Release) -> Result<()> {
     let program = match release.built {
         Built::ToShip => dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM),
-        Built::ForTests | Built::Daily => Built::Daily.host_sim()?,
+        Built::ForTests | Built::Daily => dist::stripped(&Built::Daily.host_sim()?)?,
     };
     let name = format!("haptic-guidance-{}-{}", release.version, release.host);
     let mut entries = vec![
-        Entry::read(&dist::stripped(&program)?, HOST_SIM)?.program(),
+        Entry::read(&program, HOST_SIM)?.program(),
         Entry::read(&root().join("xtask/src/release/README.txt"), "README.txt")?,
         Entry::read(&root().join("core/haptic.dbc"), "haptic.dbc")?,
         // A drive to identify.
