@@ -63,17 +63,32 @@ impl Board {
 
     /// Builds an image. QEMU's is for the bench (`firmware/Cargo.toml`); a board's product is sealed.
     pub(crate) fn build(self, image: Image) -> Result<PathBuf> {
-        let is_machine = self.chip().is_none();
-        let features = if is_machine {
+        let elf = image::elf_of(&mut image::build_command(image.bin(), M4F, &self.features()))?;
+        self.seal(image, &elf)?;
+        Ok(elf)
+    }
+
+    /// Builds what is handed on into `elf`; the linker's map.
+    pub(crate) fn build_to_ship(self, image: Image, elf: &Path) -> Result<String> {
+        let (built, map) = image::with_map(image.bin(), &self.features())?;
+        std::fs::copy(&built, elf).with_context(|| built.display().to_string())?;
+        self.seal(image, elf)?;
+        Ok(map)
+    }
+
+    fn features(self) -> String {
+        if self.chip().is_none() {
             format!("{},bench", self.feature())
         } else {
             self.feature().to_owned()
-        };
-        let elf = image::elf_of(&mut image::build_command(image.bin(), M4F, &features))?;
-        if !is_machine && image == Image::SteeringEcu {
-            seal::seal(&elf)?;
         }
-        Ok(elf)
+    }
+
+    fn seal(self, image: Image, elf: &Path) -> Result<()> {
+        if self.chip().is_some() && image == Image::SteeringEcu {
+            seal::seal(elf)?;
+        }
+        Ok(())
     }
 }
 

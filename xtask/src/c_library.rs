@@ -5,7 +5,7 @@ use std::process::Stdio;
 
 use anyhow::{Context, Result, bail};
 
-use crate::image::M4F;
+use crate::image::{self, M4F};
 use crate::tool::{Built, cargo, command, ensure, output, root, run};
 
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Werror", "-pedantic"];
@@ -16,7 +16,7 @@ const CORTEX_M4F: [&str; 4] = [
     "-mfpu=fpv4-sp-d16",
 ];
 /// What the host's standard library, which the archive holds, asks for.
-const HOST_LIBRARIES: [&str; 4] = ["-lpthread", "-ldl", "-lm", "-lgcc_s"];
+pub(crate) const HOST_LIBRARIES: [&str; 4] = ["-lpthread", "-ldl", "-lm", "-lgcc_s"];
 
 /// Builds everything into `target/dist/c`, and compares the example's words on host and target.
 pub(crate) fn check(built: Built) -> Result<()> {
@@ -54,14 +54,19 @@ pub(crate) fn check(built: Built) -> Result<()> {
     Ok(())
 }
 
-const LIBRARY: &str = "libhaptic_guidance.a";
+/// The library's file.
+pub(crate) const LIBRARY: &str = "libhaptic_guidance.a";
 
-fn host_library(dist: &Path, built: Built) -> Result<PathBuf> {
+/// The library for this computer, beneath `dist`.
+pub(crate) fn host_library(dist: &Path, built: Built) -> Result<PathBuf> {
     put(&built.package("haptic-c")?.join(LIBRARY), &dist.join("host"))
 }
 
-fn target_library(dist: &Path) -> Result<PathBuf> {
-    run(cargo().args(["build", "--profile", "dist", "-p", "haptic-c", "--target", M4F]))?;
+/// The library for a Cortex-M4F, beneath `dist`.
+pub(crate) fn target_library(dist: &Path) -> Result<PathBuf> {
+    run(cargo()
+        .args(["build", "--profile", "dist", "-p", "haptic-c", "--target", M4F])
+        .args(image::remapped()?))?;
     put(
         &root().join("target").join(M4F).join("dist").join(LIBRARY),
         &dist.join(M4F),

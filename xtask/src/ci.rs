@@ -18,7 +18,7 @@ use crate::boards::Board;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
-    bench, bindings_agree, boards, by_hand, c_library, coverage, evidence, fmu, gate, logs, mutants,
+    bench, bindings_agree, boards, by_hand, c_library, coverage, evidence, fmu, gate, logs, mutants, policy,
     profiles, python, trace, venv, web, wheel,
 };
 
@@ -88,6 +88,8 @@ const STAGES: &[Stage] = stages! {
     "requirements" Beside "every requirement has its evidence": || trace::run(false);
     "evidence" Beside "the documents' tables of figures are those that were measured": evidence::check;
     "xtask" Beside "tests of xtask itself": xtask_tests;
+    "dependencies" Beside "licences, bans and sources of dependencies": policy::dependencies;
+    "workflows" Beside "the workflows of hosted CI": policy::workflows;
     "evidence-stale" Full "no figure is older than the code that it judges": evidence::stale;
     "all-boards" Full "the same of all boards, the real ones' images among them":
         || boards::check(boards::Scope::All, Built::ForTests, false);

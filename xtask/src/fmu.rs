@@ -1,11 +1,13 @@
 //! The functional mock-up units: one binary and two descriptions for each model, checked by FMPy.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use anyhow::{Context, Result};
 
-use crate::python;
 use crate::tool::{Built, cargo, command, exists, output, root, run};
+use crate::{dist, python};
 
 /// A relying driver on the paper's course, as bindings/fmu/check.py couples it.
 const SCENARIO: &str = "speed_m_per_s = 16.666666666666668\ncondition = \"mid\"\n[driver]\nt_p_s = 0.3\n";
@@ -41,16 +43,18 @@ fn binaries(native: &Path) -> Result<Vec<(PathBuf, [&'static str; 2], &'static s
     let mut made = vec![linux];
     let targets = output(command("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
     if targets.lines().any(|line| line == WINDOWS) && exists(LINKER) {
-        run(cargo().args([
-            "build",
-            "--profile",
-            "dist",
-            "-p",
-            "haptic-fmu",
-            "--lib",
-            "--target",
-            WINDOWS,
-        ]))?;
+        run(cargo()
+            .args([
+                "build",
+                "--profile",
+                "dist",
+                "-p",
+                "haptic-fmu",
+                "--lib",
+                "--target",
+                WINDOWS,
+            ])
+            .env("RUSTFLAGS", dist::remapped()?.join(" ")))?;
         let dll = root().join("target").join(WINDOWS).join("dist/haptic_fmu.dll");
         made.push((dll, ["win64", "x86_64-windows"], "dll"));
     } else {
@@ -95,10 +99,31 @@ pub(crate) fn build(built: Built) -> Result<Vec<PathBuf>> {
     Ok(fmus)
 }
 
+/// Files and folders in a folder, and in those in it.
+fn below(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        if path.is_dir() {
+            found.extend(below(&path)?);
+        }
+        found.push(path);
+    }
+    Ok(found)
+}
+
 /// An FMU is a zip archive; Python, which checks it, can write one.
 fn archive(stage: &Path, fmu: &Path) -> Result<()> {
+    // Times of files and of their folders are in the archive, in the local time of whoever packs.
+    let time = SystemTime::UNIX_EPOCH + Duration::from_secs(dist::commit_time()?);
+    for path in below(stage)? {
+        File::open(&path)
+            .and_then(|file| file.set_modified(time))
+            .with_context(|| path.display().to_string())?;
+    }
     run(command("python3")
         .current_dir(stage)
+        .env("TZ", "UTC")
         .args(["-m", "zipfile", "-c"])
         .arg(fmu)
         .args(["modelDescription.xml", "binaries/"]))

@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 
-use crate::tool::cargo;
+use crate::dist;
+use crate::tool::{cargo, root};
 
 /// The reference board's core, with floating-point hardware.
 pub(crate) const M4F: &str = "thumbv7em-none-eabihf";
@@ -37,6 +38,10 @@ impl Image {
 /// profile without fat LTO: with it the vendor's driver of the converters keeps a panic on the torque path, which
 /// nothing reaches.
 pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command {
+    command_of("build", bin, target, features)
+}
+
+fn command_of(subcommand: &str, bin: &str, target: &str, features: &str) -> Command {
     let profile = if features.split(',').any(|feature| feature.ends_with("-sensors")) {
         "firmware-thin"
     } else {
@@ -44,11 +49,32 @@ pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command 
     };
     let mut command = cargo();
     command
-        .args(["build", "--profile", profile])
+        .args([subcommand, "--profile", profile])
         .args(["-p", "haptic-firmware", "--bin", bin])
         .args(["--target", target, "--features", features])
         .arg("--message-format=json-render-diagnostics");
     command
+}
+
+/// Builds an image to the same bytes in whatever folder; its ELF, and the linker's map.
+pub(crate) fn with_map(bin: &str, features: &str) -> Result<(PathBuf, String)> {
+    // Not absolute: Cargo makes names of symbols from it.
+    let map = "target/firmware.map";
+    let mut command = command_of("rustc", bin, M4F, features);
+    command
+        .args(remapped()?)
+        .args(["--", "-C", &format!("link-arg=-Map={map}")]);
+    let elf = elf_of(&mut command)?;
+    let text = std::fs::read_to_string(root().join(map)).context("the linker's map")?;
+    let here = format!("{}/", root().display());
+    Ok((elf, text.replace(&here, "")))
+}
+
+/// Options of Cargo that leave this machine's folders out of what is built for a board, beside the options of
+/// `.cargo/config.toml`.
+pub(crate) fn remapped() -> Result<[String; 2]> {
+    let flags = toml::Value::from(dist::remapped()?.to_vec());
+    Ok(["--config".to_owned(), format!("target.{M4F}.rustflags={flags}")])
 }
 
 /// Runs a build command, whose messages the user sees, and returns its ELF.

@@ -12,6 +12,7 @@ mod callgrind;
 mod ci;
 mod code;
 mod coverage;
+mod dist;
 mod evidence;
 mod fmu;
 mod gate;
@@ -21,9 +22,11 @@ mod image;
 mod logs;
 mod longest;
 mod mutants;
+mod policy;
 mod profiles;
 mod python;
 mod qemu;
+mod release;
 mod seal;
 mod size;
 mod speed;
@@ -110,6 +113,9 @@ enum Command {
     BindingsAgree,
     /// Builds the Python wheel into target/dist, and says what it weighs and links.
     Wheel(wheel::Options),
+    /// Makes all that is handed on into target/handed-on, and tries it: command line, wheel, FMUs, C library, page, images of the
+    /// boards, haptic-core for a registry; checksums, bills of materials, notices of licences.
+    Release(release::Options),
     /// Writes an image's CRC-32 into its ELF, which the product looks for at every start. `flash` and `run` do it too.
     Seal {
         /// The ELF of steering-ecu, changed in place.
@@ -183,6 +189,7 @@ fn main() -> ExitCode {
         Command::Logs => logs::check(Built::ToShip),
         Command::BindingsAgree => bindings_agree::check(Built::ToShip),
         Command::Wheel(options) => wheel::build(&options),
+        Command::Release(options) => release::make(&options),
         Command::Bench {
             what: Some(Bench::Speed(options)),
             ..

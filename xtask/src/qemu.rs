@@ -9,9 +9,8 @@ use std::str::FromStr;
 use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
-use defmt_decoder::{DecodeError, StreamDecoder, Table};
 
 use crate::boards::Board;
 use crate::image::Image;
@@ -132,11 +131,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
         Some(elf) => elf.clone(),
         None => options.board.build(options.image)?,
     };
-    let table = table(&elf)?;
-    let mut log = Log {
-        decoder: table.new_stream_decoder(),
-        can_recover: table.encoding().can_recover(),
-    };
+    let mut log = Log::of(&elf)?;
     let (events, seen) = channel();
     let interrupted = events.clone();
     // QEMU ends with us, also when we are asked to.
@@ -169,6 +164,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
             log.print(&bytes)?;
         }
     }
+    log.end()?;
     Ok(code)
 }
 
@@ -276,43 +272,45 @@ pub(crate) fn print_log(file: &Path, elf: Option<PathBuf>) -> Result<()> {
         Some(elf) => elf,
         None => Board::Mps2An386.build(Image::Lockstep)?,
     };
-    let table = table(&elf)?;
-    let mut log = Log {
-        decoder: table.new_stream_decoder(),
-        can_recover: table.encoding().can_recover(),
-    };
-    log.print(&fs::read(file).with_context(|| file.display().to_string())?)
+    let bytes = fs::read(file).with_context(|| file.display().to_string())?;
+    let mut log = Log::of(&elf)?;
+    log.print(&bytes)?;
+    log.end()
 }
 
-fn table(elf: &Path) -> Result<Table> {
-    let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
-    Table::parse(&bytes)?.with_context(|| format!("{} has no log messages", elf.display()))
+/// The program that prints an image's log, fed with what arrives of it.
+struct Log {
+    decoder: Child,
+    to: Option<ChildStdin>,
 }
 
-struct Log<'a> {
-    decoder: Box<dyn StreamDecoder + 'a>,
-    can_recover: bool,
-}
+impl Log {
+    /// Builds the program first, if it is not there.
+    fn of(elf: &Path) -> Result<Self> {
+        tool::run(tool::cargo().args(["build", "--release", "-q", "-p", "xtask-log"]))?;
+        let program = tool::root().join("target/release/xtask-log");
+        let mut command = Command::new(&program);
+        command.arg(elf).stdin(Stdio::piped());
+        // Ctrl-C is for us: the log is printed to its end.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut decoder = command.spawn().with_context(|| program.display().to_string())?;
+        let to = decoder.stdin.take();
+        Ok(Self { decoder, to })
+    }
 
-impl Log<'_> {
-    /// Prints the messages that `bytes` complete: time in seconds, level, text.
+    /// An error is that of the program, which said itself what was wrong.
     fn print(&mut self, bytes: &[u8]) -> Result<()> {
-        self.decoder.received(bytes);
-        loop {
-            match self.decoder.decode() {
-                Ok(frame) => {
-                    let time = frame
-                        .display_timestamp()
-                        .map(|time| time.to_string())
-                        .unwrap_or_default();
-                    let level = frame.level().map_or("", |level| level.as_str());
-                    eprintln!("{time} {level} {}", frame.display_message());
-                }
-                Err(DecodeError::UnexpectedEof) => return Ok(()),
-                Err(DecodeError::Malformed) if self.can_recover => eprintln!("(a damaged message)"),
-                Err(DecodeError::Malformed) => bail!("the log does not fit the image"),
-            }
-        }
+        let to = self.to.as_mut().context("the log has ended")?;
+        to.write_all(bytes).context("the log does not fit the image")
+    }
+
+    /// Waits until all is printed.
+    fn end(mut self) -> Result<()> {
+        drop(self.to.take());
+        let status = self.decoder.wait().context("xtask-log")?;
+        ensure!(status.success(), "the log could not be printed");
+        Ok(())
     }
 }
 

@@ -6,6 +6,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use crate::dist;
+
 /// The workspace's root.
 pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -26,21 +28,28 @@ pub(crate) fn command(program: &str) -> Command {
 }
 
 /// How everything that is tested is built: one profile and one set of features, so that nothing is compiled twice.
-pub(crate) const SHAPE: [&str; 6] = [
+pub(crate) const SHAPE: [&str; 8] = [
     "--release",
     "--workspace",
     "--exclude",
     "xtask",
+    "--exclude",
+    "xtask-log",
     "--features",
-    "host-sim/mcap",
+    ALL_FORMATS,
 ];
+
+/// What the command line can read and write beyond what the first command builds.
+pub(crate) const ALL_FORMATS: &str = "host-sim/mcap";
 
 /// Which build of a binding is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Built {
     /// With everything else, as [`SHAPE`] has it: in CI it is there already.
     ForTests,
-    /// By itself, in the profile `dist`: what is handed on.
+    /// By itself, in the profile of the tests: as the README's first command builds it.
+    Daily,
+    /// By itself, in the profile `dist` and for an old glibc: what is handed on.
     ToShip,
 }
 
@@ -49,30 +58,27 @@ impl Built {
     pub(crate) fn package(self, name: &str) -> Result<PathBuf> {
         let mut build = cargo();
         build.args(["build", "-q"]);
-        let place = match self {
-            Self::ForTests => {
-                // With the tests, whose dependencies switch on features of what the rest depends on too.
-                build.args(SHAPE).arg("--all-targets");
-                "release"
-            }
-            Self::ToShip => {
-                build.args(["--profile", "dist", "-p", name]);
-                "dist"
-            }
-        };
-        run(&mut build)?;
-        Ok(root().join("target").join(place))
+        match self {
+            // With the tests, whose dependencies switch on features of what the rest depends on too.
+            Self::ForTests => run(build.args(SHAPE).arg("--all-targets"))?,
+            Self::Daily => run(build.args(["--release", "-p", name]))?,
+            Self::ToShip => return dist::build(name, ""),
+        }
+        Ok(root().join("target/release"))
     }
 
-    /// The command line. Nothing of it is handed on, so that its own profile is for daily work.
+    /// The command line to check others with: that of daily work, which computes the same bits as the one that is handed on.
     pub(crate) fn host_sim(self) -> Result<PathBuf> {
-        if self == Self::ToShip {
-            run(cargo().args(["build", "-q", "--release", "-p", "host-sim"]))?;
-            return Ok(root().join("target/release/host-sim"));
-        }
-        Ok(self.package("host-sim")?.join("host-sim"))
+        let built = match self {
+            Self::ForTests => self,
+            Self::Daily | Self::ToShip => Self::Daily,
+        };
+        Ok(built.package("host-sim")?.join(HOST_SIM))
     }
 }
+
+/// The command line's file.
+pub(crate) const HOST_SIM: &str = if cfg!(windows) { "host-sim.exe" } else { "host-sim" };
 
 /// Runs a program whose output the user sees.
 pub(crate) fn run(command: &mut Command) -> Result<()> {

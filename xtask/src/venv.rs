@@ -33,9 +33,15 @@ pub(crate) fn environment() -> Result<PathBuf> {
     environment_of(&root().join("target/python/checks"), &PACKAGES)
 }
 
+/// Where an environment has its programs.
+pub(crate) const PROGRAMS: &str = if cfg!(windows) { "Scripts" } else { "bin" };
+
 /// The interpreter of an environment with these packages.
 pub(crate) fn environment_of(place: &Path, packages: &[&str]) -> Result<PathBuf> {
-    let python = place.join("bin/python");
+    let python = place
+        .join(PROGRAMS)
+        .join("python")
+        .with_extension(std::env::consts::EXE_EXTENSION);
     if !python.exists() {
         run(command("python3").args(["-m", "venv"]).arg(place))
             .context("Python 3 with venv is needed: apt-get install python3-venv")?;

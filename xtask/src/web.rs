@@ -6,9 +6,9 @@ use std::process::Stdio;
 use anyhow::{Context, Result, bail};
 
 use crate::tool::{Built, cargo, command, ensure, exists, output, root, run};
-use crate::venv;
+use crate::{dist, venv};
 
-const TARGET: &str = "wasm32-unknown-unknown";
+pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 const LARGEST_BYTES: u64 = 1_000_000;
 const PAGE: &str = "target/dist/haptic-lab.html";
 /// What the page's test drives too.
@@ -18,15 +18,12 @@ const AXE: [&str; 2] = ["--no-deps", "axe-playwright-python==0.1.8"];
 
 /// Builds `target/dist/haptic-lab.html`, and tries it.
 pub(crate) fn check(built: Built) -> Result<()> {
-    let bytes = pack(built)?;
-    if built == Built::ToShip && bytes > LARGEST_BYTES {
-        bail!("the page has {bytes} bytes, more than {LARGEST_BYTES}");
-    }
+    pack(built)?;
     try_it(built)
 }
 
-/// The page in one file; its size.
-fn pack(built: Built) -> Result<u64> {
+/// The page in one file.
+pub(crate) fn pack(built: Built) -> Result<PathBuf> {
     let wasm = build(built)?;
     let page = root().join(PAGE);
     std::fs::create_dir_all(root().join("target/dist"))?;
@@ -37,15 +34,19 @@ fn pack(built: Built) -> Result<u64> {
         .stdout(Stdio::null()))?;
     let bytes = std::fs::metadata(&page)?.len();
     println!("{}: {bytes} bytes", page.display());
-    Ok(bytes)
+    if built == Built::ToShip && bytes > LARGEST_BYTES {
+        bail!("the page has {bytes} bytes, more than {LARGEST_BYTES}");
+    }
+    Ok(page)
 }
 
 fn build(built: Built) -> Result<PathBuf> {
     let profile = match built {
-        Built::ForTests => "release",
+        Built::ForTests | Built::Daily => "release",
         Built::ToShip => "page",
     };
-    run(cargo().args([
+    let mut build = cargo();
+    build.args([
         "build",
         "--profile",
         profile,
@@ -53,8 +54,11 @@ fn build(built: Built) -> Result<PathBuf> {
         "haptic-web",
         "--target",
         TARGET,
-    ]))
-    .with_context(|| format!("rustup target add {TARGET} brings what is missing"))?;
+    ]);
+    if built == Built::ToShip {
+        build.env("RUSTFLAGS", dist::remapped()?.join(" "));
+    }
+    run(&mut build).with_context(|| format!("rustup target add {TARGET} brings what is missing"))?;
     Ok(root()
         .join("target")
         .join(TARGET)

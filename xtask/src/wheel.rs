@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
-use crate::tool::{cargo, command, output, root, run};
-use crate::venv;
+use crate::tool::{ALL_FORMATS, Built, HOST_SIM, cargo, command, output, root, run};
+use crate::{dist, venv};
 
 /// What `cargo xtask wheel` is asked for.
 #[derive(Debug, Args)]
 pub(crate) struct Options {
+    /// Build what is handed on: optimised, and for every Linux since glibc 2.17
+    #[arg(long)]
+    dist: bool,
     /// Install the wheel into a fresh virtual environment and run its tests, its README and its examples there.
     #[arg(long)]
     test: bool,
@@ -20,16 +23,18 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The wheel, built and tested.
+    /// The wheel that is handed on, built and tested.
     pub(crate) const fn tested() -> Self {
         Self {
+            dist: true,
             test: true,
             bench: false,
         }
     }
 }
 
-/// What a wheel must not link: the fault injector, serial ports, charts, the command line.
+/// What the module must not link, because it lives in somebody else's process: the fault injector, serial ports, charts, the
+/// command line. This lies beside the module as a program of its own.
 const NOT_IN_A_WHEEL: [&str; 10] = [
     "haptic-campaign",
     "haptic-pil",
@@ -42,12 +47,13 @@ const NOT_IN_A_WHEEL: [&str; 10] = [
     "clap",
     "indicatif",
 ];
-const LARGEST_MB: f64 = 5.0;
-const MATURIN: &str = "maturin>=1.9,<2";
+const LARGEST_MB: f64 = 20.0;
+/// What maturin packs into a wheel beside the module: its folder `scripts` is installed among the programs.
+const DATA: &str = "bindings/python/haptic_guidance.data";
 
 /// Builds the wheel, and tries it if asked to.
 pub(crate) fn build(options: &Options) -> Result<()> {
-    let wheel = make()?;
+    let wheel = make(options.dist)?;
     let megabytes = std::fs::metadata(&wheel)?.len() as f64 / 1e6;
     println!("{}: {megabytes:.2} MB", wheel.display());
     if megabytes > LARGEST_MB {
@@ -68,12 +74,12 @@ pub(crate) fn build(options: &Options) -> Result<()> {
 
 /// The interpreter of an environment that has the wheel, built anew.
 pub(crate) fn installed() -> Result<PathBuf> {
-    install(&make()?)
+    install(&make(true)?)
 }
 
-fn make() -> Result<PathBuf> {
-    let tools = root().join("target/python/tools");
-    venv::environment_of(&tools, &[MATURIN])?;
+/// Builds the wheel with the command line in it: `to_ship`, or in the profile of the tests, which shares what is compiled with the
+/// README's first command.
+pub(crate) fn make(to_ship: bool) -> Result<PathBuf> {
     let dist = root().join("target/dist");
     let wheels = || {
         let files = std::fs::read_dir(&dist).into_iter().flatten().flatten();
@@ -85,11 +91,39 @@ fn make() -> Result<PathBuf> {
     for old in wheels() {
         std::fs::remove_file(&old).with_context(|| old.display().to_string())?;
     }
-    let maturin = tools.join("bin/maturin");
-    run(command(&maturin.to_string_lossy())
-        .args("build --profile dist -m bindings/python/Cargo.toml --out".split(' '))
-        .arg(&dist))?;
+    let built = pack(&dist, to_ship);
+    // What stays would be in a wheel of maturin alone, however old it is.
+    let _ = std::fs::remove_dir_all(root().join(DATA));
+    built?;
     wheels().next().context("maturin left no wheel")
+}
+
+fn pack(dist: &Path, to_ship: bool) -> Result<()> {
+    let scripts = root().join(DATA).join("scripts");
+    std::fs::create_dir_all(&scripts).with_context(|| scripts.display().to_string())?;
+    let program = scripts.join(HOST_SIM);
+    let mut maturin = command(&dist::tools()?.join("maturin").to_string_lossy());
+    maturin
+        .args("build -m bindings/python/Cargo.toml --out".split(' '))
+        .arg(dist);
+    if to_ship {
+        let built = dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM);
+        std::fs::copy(built, &program)?;
+        let host = dist::host()?;
+        maturin.args(["--profile", "dist", "--target", &host]);
+        if dist::has_glibc(&host) {
+            maturin.args(["--compatibility", "manylinux2014"]);
+        }
+        dist::prepare(&mut maturin)?;
+    } else {
+        std::fs::copy(dist::stripped(&Built::Daily.host_sim()?)?, &program)?;
+        maturin.args(["--profile", "release"]);
+        if cfg!(target_os = "linux") {
+            // No promise to other computers.
+            maturin.args(["--compatibility", "linux"]);
+        }
+    }
+    run(&mut maturin)
 }
 
 /// What is linked.

@@ -1,6 +1,8 @@
 """What is installed: small, typed, and without what does not belong into somebody else's process."""
 
 import importlib.metadata
+import subprocess
+import sysconfig
 from pathlib import Path
 
 import pytest
@@ -19,7 +21,10 @@ def test_the_package_is_typed_and_small():
     files = installed()
     names = {file.name for file in files}
     assert {"py.typed", "_native.pyi", "__init__.py", "envs.py"} <= names
-    assert sum(file.stat().st_size for file in files if "__pycache__" not in file.parts) < 20e6
+    mine = [file for file in files if "__pycache__" not in file.parts]
+    # The program beside the package has what the package must not have.
+    assert sum(file.stat().st_size for file in mine if file.stem != "host-sim") < 20e6
+    assert sum(file.stat().st_size for file in mine if file.stem == "host-sim") < 45e6
 
 
 def test_no_injector_no_serial_port_no_charts():
@@ -32,6 +37,12 @@ def test_no_injector_no_serial_port_no_charts():
     for name in NOT_LINKED:
         assert name not in library, name
     assert not hasattr(hg._native, "inject")
+
+
+def test_the_command_line_is_a_program_of_the_environment():
+    program = Path(sysconfig.get_path("scripts")) / f"host-sim{sysconfig.get_config_var('EXE')}"
+    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True, env={}).stdout
+    assert said.split() == ["host-sim", importlib.metadata.version("haptic-guidance")]
 
 
 def test_gymnasium_and_the_rest_are_optional():

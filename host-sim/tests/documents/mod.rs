@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates whose README is checked; the bindings' are checked by their own tools.
-const CRATES: [&str; 12] = [
+const CRATES: [&str; 14] = [
     "core",
     "firmware",
     "firmware/lockstep",
     "host-sim",
     "host-sim/sim",
+    "host-sim/vectorised",
     "host-sim/log",
     "host-sim/analysis",
     "host-sim/batch",
@@ -24,6 +25,7 @@ const CRATES: [&str; 12] = [
     "host-sim/pil",
     "host-sim/report",
     "xtask",
+    "xtask/log",
 ];
 
 /// A directory's names in the directory that examples run in.
