@@ -135,7 +135,7 @@ fn a_parquet_file_of_polars_is_listed_with_its_units() {
     );
     let output = host_sim(directory.path(), &["convert", file, "--json"]);
     let channels: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let listed: Vec<(&str, &str, u64)> = channels
+    let listed: Vec<(&str, &str, u64)> = channels["channels"]
         .as_array()
         .unwrap()
         .iter()

@@ -117,7 +117,7 @@ fn use_channels(recording: &Recording, number: u64) {
 fn read_recording(bytes: &[u8], number: u64, format: Format, dbc: &str) {
     match formats::read_bytes(bytes.to_vec(), format, None) {
         Ok(Contents::Channels(recording)) => use_channels(&recording, number),
-        Ok(Contents::Frames(frames)) => {
+        Ok(Contents::Frames(frames, _)) => {
             if let Ok(recording) = formats::dbc::channels(&frames, dbc) {
                 use_channels(&recording, number);
             }
@@ -260,7 +260,7 @@ fn the_seeds_are_good() {
     }
     for bytes in seeds::blf_objects() {
         let read = formats::read_bytes(seeds::blf_file(bytes), Format::Blf, None);
-        assert!(matches!(read, Ok(Contents::Frames(frames)) if !frames.is_empty()));
+        assert!(matches!(read, Ok(Contents::Frames(frames, _)) if !frames.is_empty()));
     }
     let compressed = seeds::compressed_mat(seeds::table("mat").remove(0));
     assert!(of_bytes(compressed, Some(Format::Mat), None, &[], &how).is_ok());

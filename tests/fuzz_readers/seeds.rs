@@ -58,14 +58,7 @@ fn drive() -> Recording {
         course("driver_torque_nm", "N.m", 0.9),
         course("speed_m_per_s", "m/s", 20.0),
     ];
-    let name = String::new();
-    Recording {
-        groups: vec![Group {
-            name,
-            time_s,
-            channels,
-        }],
-    }
+    Recording::of(Group::new(time_s, channels))
 }
 
 /// What a writer leaves.

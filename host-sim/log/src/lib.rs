@@ -31,6 +31,7 @@ mod event;
 pub mod formats;
 #[cfg(feature = "parquet")]
 pub mod guard;
+pub mod notes;
 pub mod recording;
 pub mod table;
 pub mod trace;

@@ -27,13 +27,7 @@ fn recording() -> Recording {
             time_s.iter().map(|t| if *t < 1.0 { t / 3.0 } else { f64::NAN }),
         ),
     ];
-    Recording {
-        groups: vec![Group {
-            name: String::new(),
-            time_s,
-            channels,
-        }],
-    }
+    Recording::of(Group::new(time_s, channels))
 }
 
 fn frames() -> Vec<CandumpFrame> {
@@ -100,7 +94,7 @@ fn what_is_written_is_read_again() {
         assert_eq!(found.channels.len(), 2, "{extension}");
     }
     for extension in BUSES {
-        let Contents::Frames(found) = read(written(extension), extension).unwrap() else {
+        let Contents::Frames(found, _) = read(written(extension), extension).unwrap() else {
             panic!("{extension}: no frames");
         };
         let plain = |f: &CandumpFrame| ((f.time_s * 1e6).round() as i64, f.id, f.extended, f.data.clone());

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use haptic_analysis::identify::HAPTIC_DBC;
 use haptic_log::formats::{self, Contents, Format, TimeColumn};
+use haptic_log::notes::Notes;
 use haptic_log::recording::{Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
@@ -34,6 +35,14 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Listed<'a> {
+    channels: Vec<Channel>,
+    /// What was left out, merged, cut, mended, guessed or converted.
+    notes: &'a Notes,
+}
+
 #[derive(Serialize)]
 struct Channel {
     name: String,
@@ -58,31 +67,34 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
     let contents = formats::read(&arguments.input, time.as_ref())?;
-    if let (Contents::Frames(frames), Some(output), Some(format)) = (&contents, &arguments.output, target)
+    if let (Contents::Frames(frames, notes), Some(output), Some(format)) =
+        (&contents, &arguments.output, target)
         && format.holds_frames()
     {
         if arguments.rate.is_some() {
             return Err("--rate is for channels, not for frames".into());
         }
         formats::write_frames(output, frames)?;
+        print_reading(notes);
         eprintln!("{}: {} frames", output.display(), frames.len());
         return Ok(Outcome::Good);
     }
     let named = in_file::<RecordingError>(&arguments.input);
     let mut recording = match contents {
         Contents::Channels(recording) => recording,
-        Contents::Frames(frames) => {
+        Contents::Frames(frames, notes) => {
             let dbc = match &arguments.dbc {
                 Some(path) => std::fs::read_to_string(path).map_err(in_file(path))?,
                 None => HAPTIC_DBC.to_owned(),
             };
-            formats::dbc::channels(&frames, &dbc).map_err(&named)?
+            let mut recording = formats::dbc::channels(&frames, &dbc).map_err(&named)?;
+            recording.notes.append(notes);
+            recording
         }
     };
     if let Some(rate_hz) = arguments.rate {
-        recording = Recording {
-            groups: vec![recording.resampled(rate_hz).map_err(&named)?],
-        };
+        let even = recording.resampled(rate_hz).map_err(&named)?;
+        recording.groups = vec![even];
     }
     let table = recording.table();
     let Some(output) = &arguments.output else {
@@ -94,15 +106,28 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
                 sample_rate_hz: line.sample_rate_hz,
                 samples: line.samples,
             });
-            print_json(&channels.collect::<Vec<_>>())?;
+            print_json(&Listed {
+                channels: channels.collect(),
+                notes: &recording.notes,
+            })?;
         } else {
-            print(&listed(&recording).to_text(width()))?;
+            let notes: String = recording.notes.iter().map(|note| format!("\n{note}")).collect();
+            let space = if notes.is_empty() { "" } else { "\n" };
+            print(&format!("{}{space}{notes}", listed(&recording).to_text(width())))?;
         }
         return Ok(Outcome::Good);
     };
+    print_reading(&recording.notes);
     formats::write(output, recording)?;
     eprintln!("{}: {} channels", output.display(), table.len());
     Ok(Outcome::Good)
+}
+
+/// What the file that is written does not hold as the other did, on stderr.
+fn print_reading(notes: &Notes) {
+    for note in notes.iter() {
+        eprintln!("note: {note}");
+    }
 }
 
 fn listed(recording: &Recording) -> Table {

@@ -136,6 +136,12 @@ class Fit:
         return self.results["notes"]
 
     @property
+    def reading(self) -> list[tuple[str, str, str]]:
+        """What was left out, merged, cut, mended, guessed or converted when the drive was read: what, found, done."""
+        preflight = self.results["preflight"] or {"reading": []}
+        return [tuple(row) for row in preflight["reading"]]
+
+    @property
     def refuted(self) -> list[Any]:
         """Assumptions that the record refutes: with any, nothing is identified."""
         return self.results["refuted"]

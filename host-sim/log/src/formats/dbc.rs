@@ -74,13 +74,14 @@ pub fn channels(frames: &[CandumpFrame], dbc: &str) -> Result<Recording, Recordi
             name: message.name.clone(),
             time_s: frames.iter().map(|frame| frame.time_s).collect(),
             channels: channels.collect::<Result<_, _>>()?,
+            ..Group::default()
         });
     }
     if groups.is_empty() {
         let count = frames.len();
         return Err(format!("none of the {count} frames is a message of the DBC file").into());
     }
-    Ok(Recording { groups })
+    Ok(groups.into())
 }
 
 fn series(

@@ -373,7 +373,7 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
     if groups.is_empty() {
         return Err("there is no group of channels with a time".into());
     }
-    Ok(Recording { groups })
+    Ok(groups.into())
 }
 
 /// Every record to its group.
@@ -426,6 +426,7 @@ fn finished(open: Open) -> Option<Group> {
         name: open.name,
         time_s: time.values.iter().map(|t| t * factor).collect(),
         channels: channels.into_iter().map(|place| place.series).collect(),
+        ..Group::default()
     })
 }
 

@@ -29,6 +29,7 @@ mod parquet;
 use std::path::Path;
 
 use crate::candump::{self, CandumpFrame};
+use crate::notes::Notes;
 use crate::recording::{Group, Recording, RecordingError, Series};
 use crate::units;
 
@@ -104,8 +105,27 @@ impl Format {
 pub enum Contents {
     /// Channels.
     Channels(Recording),
-    /// Frames of a bus, in the order of the file.
-    Frames(Vec<CandumpFrame>),
+    /// Frames of a bus, in the order of the file, and what else it holds.
+    Frames(Vec<CandumpFrame>, Notes),
+}
+
+impl Contents {
+    /// # Errors
+    /// Neither a value nor a frame, with what there is otherwise.
+    fn not_empty(self) -> Result<Self, RecordingError> {
+        let (is_empty, what, notes) = match &self {
+            Self::Frames(frames, notes) => (frames.is_empty(), "frame", notes),
+            Self::Channels(recording) => {
+                let mut channels = recording.groups.iter().flat_map(|group| &group.channels);
+                let is_empty = channels.all(|channel| channel.values.iter().all(|value| value.is_nan()));
+                (is_empty, "channel with a number", &recording.notes)
+            }
+        };
+        if is_empty {
+            return Err(format!("there is no {what} in it{}", notes.aside()).into());
+        }
+        Ok(self)
+    }
 }
 
 /// The column that is the time where it has another name than `time_s`, and what makes it seconds.
@@ -137,7 +157,9 @@ pub fn read_bytes(
     format: Format,
     time: Option<&TimeColumn>,
 ) -> Result<Contents, RecordingError> {
-    contents(bytes, format, time).map_err(RecordingError::printable)
+    contents(bytes, format, time)
+        .and_then(Contents::not_empty)
+        .map_err(RecordingError::printable)
 }
 
 fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
@@ -148,10 +170,10 @@ fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result
         })
     };
     let table = match format {
-        Format::Candump => return Ok(Contents::Frames(candump::parse(&text(bytes)?)?)),
-        Format::Asc => return Ok(Contents::Frames(asc::parse(&text(bytes)?)?)),
-        Format::Blf => return Ok(Contents::Frames(blf::parse(&bytes)?)),
-        Format::Mdf4 => return Ok(Contents::Channels(mdf::read(&bytes)?.described())),
+        Format::Candump => return Ok(Contents::Frames(candump::parse(&text(bytes)?)?, Notes::default())),
+        Format::Asc => return Ok(Contents::Frames(asc::parse(&text(bytes)?)?, Notes::default())),
+        Format::Blf => return Ok(Contents::Frames(blf::parse(&bytes)?, Notes::default())),
+        Format::Mdf4 => return Ok(Contents::Channels(mdf::read(&bytes)?.described().settled()?)),
         Format::Mcap => {
             return Err("MCAP is written, not read: convert from what it was made of".into());
         }
@@ -217,7 +239,7 @@ fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Reco
     }
     // 1.0 changes no bit.
     let time_s = time.values.iter().map(|t| t * factor).collect();
-    Ok(Recording::of(Group::new(time_s, columns)).described())
+    Recording::of(Group::new(time_s, columns)).described().settled()
 }
 
 /// Writes channels into the file at `path`.

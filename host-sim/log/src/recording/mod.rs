@@ -5,9 +5,12 @@
 //! the channels mean.
 
 mod grid;
+mod stamps;
 
+use crate::notes::Notes;
 use crate::trace::{CHANNELS, Trace};
 use crate::units;
+pub use stamps::Lines;
 
 /// A channel of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,6 +34,8 @@ pub struct Group {
     pub time_s: Vec<f64>,
     /// The channels, each with as many values as there are instants.
     pub channels: Vec<Series>,
+    /// Where the rows stand, of a text.
+    pub lines: Lines,
 }
 
 /// Everything that a file holds.
@@ -38,6 +43,8 @@ pub struct Group {
 pub struct Recording {
     /// The groups, in the order of the file.
     pub groups: Vec<Group>,
+    /// What the file holds that the groups do not.
+    pub notes: Notes,
 }
 
 /// Why a recording was refused: one sentence with channel and reason, and the file where one is known.
@@ -127,8 +134,7 @@ impl Recording {
     /// A recording of one group.
     #[must_use]
     pub fn of(group: Group) -> Self {
-        let groups = vec![group];
-        Self { groups }
+        vec![group].into()
     }
 
     /// Every channel with its group.
@@ -176,7 +182,11 @@ impl Recording {
         }
         match found[..] {
             [found] => Ok(found),
-            [] => Err(format!("there is no channel {name}{}", self.near(name)).into()),
+            [] => Err(match self.notes.why_left_out(name) {
+                Some(why) => format!("there is no channel {name}: it was left out ({why})"),
+                None => format!("there is no channel {name}{}", self.near(name)),
+            }
+            .into()),
             [(first, a), (second, b), ..] if std::ptr::eq(first, second) => Err(format!(
                 "channel {name} is there twice, as {} and as {}: say which",
                 a.name, b.name
@@ -223,6 +233,15 @@ impl Recording {
             }
         }
         self
+    }
+}
+
+impl From<Vec<Group>> for Recording {
+    fn from(groups: Vec<Group>) -> Self {
+        Self {
+            groups,
+            ..Self::default()
+        }
     }
 }
 

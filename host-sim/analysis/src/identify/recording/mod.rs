@@ -13,6 +13,7 @@ mod mapping;
 use std::path::Path;
 
 use haptic_log::formats::{self, Contents, Format, TimeColumn};
+use haptic_log::notes::Note;
 use haptic_log::recording::{Group, Recording, RecordingError, Series};
 use haptic_log::table::TableReader;
 use haptic_log::units;
@@ -72,13 +73,16 @@ pub fn of_bytes(
     }
     let contents = formats::read_bytes(bytes, format.unwrap_or(Format::Csv), time_of(maps).as_ref());
     let recording = match contents? {
-        Contents::Frames(frames) if maps.is_empty() => {
-            let (log, note) = bus_trace::of_frames(&frames, how)?;
+        Contents::Frames(frames, notes) if maps.is_empty() => {
+            let (mut log, note) = bus_trace::of_frames(&frames, how)?;
+            log.findings.extend(notes.iter().map(Note::finding));
             return Ok((log, vec![note.into()]));
         }
-        Contents::Frames(frames) => {
+        Contents::Frames(frames, notes) => {
             let dbc = bus_trace::dbc_text(how.dbc)?;
-            formats::dbc::channels(&frames, &dbc)?
+            let mut recording = formats::dbc::channels(&frames, &dbc)?;
+            recording.notes.append(notes);
+            recording
         }
         Contents::Channels(recording) => recording,
     };
@@ -188,6 +192,7 @@ fn of_channels(
         at_the_torque(&columns, &mut notes)?
     };
     let mut log = DriveLog::from_rows(time_s, values, manual, how.stretches)?;
+    log.findings.extend(recording.notes.iter().map(Note::finding));
     tell_speed(&mut log, recording, maps, &mut notes)?;
     Ok((log, notes))
 }

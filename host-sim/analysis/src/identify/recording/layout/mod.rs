@@ -167,12 +167,8 @@ impl Layout {
                 values,
             })
         });
-        let group = Group {
-            name: String::new(),
-            channels: channels.collect(),
-            time_s,
-        };
-        let (mut log, mut notes) = of_channels(&Recording { groups: vec![group] }, &[], how)?;
+        let group = Group::new(time_s, channels.collect());
+        let (mut log, mut notes) = of_channels(&Recording::of(group), &[], how)?;
         log.approximate_points = self.columns.contains_key("curvature_1pm");
         log.findings.extend(findings);
         notes.push(format!("Layout {}; {}, {}", self.name, self.source, self.licence));
