@@ -23,7 +23,7 @@ use std::sync::Once;
 
 use haptic_analysis::identify::{HAPTIC_DBC, Recording as How, of_bytes};
 use haptic_batch::sweep::Sweep;
-use haptic_log::formats::{self, Contents, Format};
+use haptic_log::formats::{self, Contents, Format, Reading};
 use haptic_log::recording::Recording;
 use haptic_log::trace::Trace;
 use haptic_sim::input::InputError;
@@ -115,7 +115,7 @@ fn use_channels(recording: &Recording, number: u64) {
 
 /// Reads a recording as `convert` and as `identify` do.
 fn read_recording(bytes: &[u8], number: u64, format: Format, dbc: &str) {
-    match formats::read_bytes(bytes.to_vec(), format, None) {
+    match formats::read_bytes(bytes.to_vec(), format, Reading::default()) {
         Ok(Contents::Channels(recording)) => use_channels(&recording, number),
         Ok(Contents::Frames(frames, _)) => {
             if let Ok(recording) = formats::dbc::channels(&frames, dbc) {
@@ -259,7 +259,7 @@ fn the_seeds_are_good() {
         of_bytes(whole, Some(format), None, &[], &How { manual: true, ..how }).expect("a drive");
     }
     for bytes in seeds::blf_objects() {
-        let read = formats::read_bytes(seeds::blf_file(bytes), Format::Blf, None);
+        let read = formats::read_bytes(seeds::blf_file(bytes), Format::Blf, Reading::default());
         assert!(matches!(read, Ok(Contents::Frames(frames, _)) if !frames.is_empty()));
     }
     let compressed = seeds::compressed_mat(seeds::table("mat").remove(0));

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_analysis::identify::HAPTIC_DBC;
-use haptic_log::formats::{self, Contents, Format, TimeColumn};
+use haptic_log::formats::{self, Contents, Format, Reading};
 use haptic_log::notes::Notes;
-use haptic_log::recording::{Recording, RecordingError};
+use haptic_log::recording::{Recording, RecordingError, Term};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
@@ -53,7 +53,8 @@ struct Channel {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let time = arguments.time.as_deref().map(time_column).transpose()?;
+    let time = arguments.time.as_deref().map(str::parse::<Term>).transpose();
+    let time = time.map_err(|e| format!("--time: {e}"))?;
     if let Some(rate_hz) = arguments.rate.filter(|rate| !(0.1..=1e5).contains(rate)) {
         return Err(format!("--rate {rate_hz}: 0.1 to 100000 Hz is wanted").into());
     }
@@ -66,7 +67,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         ));
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
-    let contents = formats::read(&arguments.input, time.as_ref())?;
+    let contents = formats::read(
+        &arguments.input,
+        Reading {
+            time: time.as_ref(),
+            only: None,
+        },
+        |file| Box::new(file),
+    )?;
     if let (Contents::Frames(frames, notes), Some(output), Some(format)) =
         (&contents, &arguments.output, target)
         && format.holds_frames()
@@ -141,18 +149,4 @@ fn listed(recording: &Recording) -> Table {
         ]
     };
     Table::of_rows("", recording.table().into_iter().map(row))
-}
-
-fn time_column(text: &str) -> Result<TimeColumn, BadInput> {
-    let column = |name: &str, scale| TimeColumn {
-        name: name.trim().into(),
-        scale,
-    };
-    let Some((name, scale)) = text.rsplit_once('*') else {
-        return Ok(column(text, None));
-    };
-    match scale.trim().parse::<f64>() {
-        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok(column(name, Some(scale))),
-        _ => Err(format!("--time {text}: the scale {scale:?} is no number above 0").into()),
-    }
 }
