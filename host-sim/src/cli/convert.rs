@@ -1,15 +1,15 @@
 //! `host-sim convert IN [OUT]`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use haptic_analysis::identify::HAPTIC_DBC;
-use haptic_log::formats::{self, Contents, Format, Reading};
+use haptic_log::formats::{self, Contents, Format};
 use haptic_log::notes::Notes;
-use haptic_log::recording::{Recording, RecordingError, Term};
+use haptic_log::recording::{Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
+use super::recording::ReadingArguments;
 use super::{BadInput, Outcome, in_file, output, print, print_json, width};
 
 #[derive(Debug, Args)]
@@ -20,12 +20,8 @@ pub(super) struct Arguments {
     /// File to write, in the format of its extension: one of those, or .mcap. Without it the channels are listed
     #[arg(value_name = "OUT")]
     output: Option<PathBuf>,
-    /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
-    #[arg(long, value_name = "FILE")]
-    dbc: Option<PathBuf>,
-    /// The channel that is the time, if it is not time_s
-    #[arg(long, value_name = "CHANNEL[*SCALE]")]
-    time: Option<String>,
+    #[command(flatten)]
+    reading: ReadingArguments,
     /// Put all channels on an even grid of so many rows a second: whole numbers as held, others on the line between
     /// neighbours. Without it every instant of every channel is a row
     #[arg(long, value_name = "HZ")]
@@ -53,8 +49,6 @@ struct Channel {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let time = arguments.time.as_deref().map(str::parse::<Term>).transpose();
-    let time = time.map_err(|e| format!("--time: {e}"))?;
     if let Some(rate_hz) = arguments.rate.filter(|rate| !(0.1..=1e5).contains(rate)) {
         return Err(format!("--rate {rate_hz}: 0.1 to 100000 Hz is wanted").into());
     }
@@ -67,39 +61,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         ));
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
-    let contents = formats::read(
-        &arguments.input,
-        Reading {
-            time: time.as_ref(),
-            only: None,
-        },
-        |file| Box::new(file),
-    )?;
-    if let (Contents::Frames(frames, notes), Some(output), Some(format)) =
-        (&contents, &arguments.output, target)
-        && format.holds_frames()
-    {
-        if arguments.rate.is_some() {
-            return Err("--rate is for channels, not for frames".into());
-        }
-        formats::write_frames(output, frames)?;
-        print_reading(notes);
-        eprintln!("{}: {} frames", output.display(), frames.len());
-        return Ok(Outcome::Good);
-    }
-    let named = in_file::<RecordingError>(&arguments.input);
-    let mut recording = match contents {
+    let wants_frames = target.is_some_and(Format::holds_frames);
+    let mut recording = match arguments.reading.read(&arguments.input, wants_frames)? {
         Contents::Channels(recording) => recording,
         Contents::Frames(frames, notes) => {
-            let dbc = match &arguments.dbc {
-                Some(path) => std::fs::read_to_string(path).map_err(in_file(path))?,
-                None => HAPTIC_DBC.to_owned(),
-            };
-            let mut recording = formats::dbc::channels(&frames, &dbc).map_err(&named)?;
-            recording.notes.append(notes);
-            recording
+            if arguments.rate.is_some() {
+                return Err("--rate is for channels, not for frames".into());
+            }
+            let output = arguments.output.as_deref().unwrap_or(Path::new(""));
+            formats::write_frames(output, &frames)?;
+            print_reading(&notes);
+            eprintln!("{}: {} frames", output.display(), frames.len());
+            return Ok(Outcome::Good);
         }
     };
+    let named = in_file::<RecordingError>(&arguments.input);
     if let Some(rate_hz) = arguments.rate {
         let even = recording.resampled(rate_hz).map_err(&named)?;
         recording.groups = vec![even];
@@ -121,7 +97,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         } else {
             let notes: String = recording.notes.iter().map(|note| format!("\n{note}")).collect();
             let space = if notes.is_empty() { "" } else { "\n" };
-            print(&format!("{}{space}{notes}", listed(&recording).to_text(width())))?;
+            let table = listed(&recording).to_text(width());
+            print(&format!("{}{space}{notes}", table.trim_end()))?;
         }
         return Ok(Outcome::Good);
     };
@@ -132,7 +109,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
 }
 
 /// What the file that is written does not hold as the other did, on stderr.
-fn print_reading(notes: &Notes) {
+pub(super) fn print_reading(notes: &Notes) {
     for note in notes.iter() {
         eprintln!("note: {note}");
     }

@@ -1,13 +1,50 @@
-//! A recorded drive as an argument: the file, and what its channels and frames are.
+//! A recorded drive as an argument: the file, and what its channels and frames are; everywhere the same options.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use haptic_analysis::identify::{DriveLog, Layout, Mapping, Recording, open_mapped};
+use haptic_analysis::identify::{
+    DriveLog, FixError, HAPTIC_DBC, Layout, Mapping, Options, Recording as How, open_mapped,
+};
 use haptic_batch::files::load_scenario;
 use haptic_batch::identify::single_track;
+use haptic_log::formats::{self, Contents, Format, Reading};
+use haptic_log::recording::{Recording, RecordingError, Term};
+use haptic_sim::input::in_range;
 
-use super::BadInput;
+use super::convert::print_reading;
+use super::{BadInput, in_file, progress};
+
+/// How a recording is read.
+#[derive(Debug, Args)]
+pub(super) struct ReadingArguments {
+    /// A channel of another name or unit, such as driver_torque_nm=TorsionBar, 'wheel_angle_rad=Steering [deg]' or
+    /// wheel_angle_rad=Steering*0.0174533; without a unit or factor the file's own unit is converted; may be repeated
+    #[arg(long, value_name = "NAME=CHANNEL")]
+    map: Vec<String>,
+    /// The channel that is the time, if it is not time_s; with a unit or a factor as in --map
+    #[arg(long, value_name = "CHANNEL")]
+    time: Option<String>,
+    /// Whose recording it is: openlka, openpilot, sadc, udacity, cognitive-driver-model, or a layout of one's own. Of a drive
+    /// that an automation shares in turns, --manual takes the stretches by hand, otherwise the others are taken
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    layout: Option<String>,
+    /// Use the recording from this time on, s; may be repeated with --to for several stretches
+    #[arg(long, value_name = "S")]
+    from: Vec<f64>,
+    /// Use the recording up to this time, s
+    #[arg(long, value_name = "S")]
+    to: Vec<f64>,
+    /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
+    /// ones; 0 cuts at each
+    #[arg(long, value_name = "S", default_value_t = 0.3)]
+    max_gap: f64,
+    /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
+    #[arg(long, value_name = "FILE")]
+    dbc: Option<PathBuf>,
+}
 
 #[derive(Debug, Args)]
 pub(super) struct RecordingArguments {
@@ -15,21 +52,136 @@ pub(super) struct RecordingArguments {
     /// wheel_angle_rad, guidance_torque_nm, driver_torque_nm, or the bus (candump -L, .asc, .blf)
     #[arg(value_name = "LOG")]
     pub(super) log: PathBuf,
-    /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
-    #[arg(long, value_name = "FILE")]
-    dbc: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) reading: ReadingArguments,
     /// The vehicle of a recording of the bus, if not that of table 9: a scenario file whose [vehicle] says what it is. The
     /// bus does not carry the driver's far point; it is computed with this vehicle
     #[arg(long, value_name = "FILE.toml")]
-    vehicle: Option<PathBuf>,
-    /// A channel of another name or unit, such as wheel_angle_rad=SteeringAngle*0.0174533 or driver_torque_nm=TorsionBar;
-    /// without a scale its unit is converted if the file says it; may be repeated
-    #[arg(long, value_name = "NAME=CHANNEL[*SCALE]")]
-    map: Vec<String>,
-    /// Whose recording it is: openlka, openpilot, sadc, udacity, cognitive-driver-model, or a layout of one's own. Of a drive
-    /// that an automation shares in turns, --manual takes the stretches by hand, otherwise the others are taken
-    #[arg(long, value_name = "NAME|FILE.toml")]
-    layout: Option<String>,
+    pub(super) vehicle: Option<PathBuf>,
+}
+
+impl ReadingArguments {
+    /// Takes stretches and gaps into the options of a fit.
+    pub(super) fn choose(&self, options: &mut Options) -> Result<(), BadInput> {
+        options.between(&self.from, &self.to)?;
+        in_range("--max-gap", self.max_gap, 0.0..=1.0, "s")?;
+        options.bridge_s = self.max_gap;
+        Ok(())
+    }
+
+    /// The stretches that are asked for; all of a recording if there is none.
+    fn stretches(&self) -> Result<Vec<(f64, f64)>, FixError> {
+        let mut options = Options::default();
+        options.between(&self.from, &self.to)?;
+        Ok(options.stretches)
+    }
+
+    /// The columns of a log that are called otherwise.
+    pub(super) fn maps(&self) -> Result<Vec<Mapping>, BadInput> {
+        let time = self.time.iter().map(|time| ("--time", format!("time_s={time}")));
+        let maps = self.map.iter().map(|map| ("--map", map.clone()));
+        let parsed = time.chain(maps).map(|(option, map)| {
+            let parsed = map.parse::<Mapping>();
+            parsed.map_err(|e| BadInput(format!("{option} {}", e.to_string().trim_start_matches("map "))))
+        });
+        parsed.collect()
+    }
+
+    pub(super) fn layout(&self) -> Result<Option<Layout>, BadInput> {
+        Ok(self.layout.as_deref().map(Layout::named).transpose()?)
+    }
+
+    /// The log in a file, of which these stretches will be used, and what a reader of the results has to know of it.
+    pub(super) fn open(
+        &self,
+        path: &Path,
+        manual: bool,
+        stretches: &[(f64, f64)],
+        vehicle: Option<&Path>,
+    ) -> Result<(DriveLog, Vec<String>), BadInput> {
+        let vehicle = vehicle.map(load_scenario).transpose()?;
+        let how = How {
+            dbc: self.dbc.as_deref(),
+            vehicle: vehicle.as_ref().map(single_track),
+            manual,
+            stretches,
+        };
+        Ok(open_mapped(path, self.layout()?.as_ref(), &self.maps()?, &how)?)
+    }
+
+    /// Whether a file is to be understood otherwise than it says itself.
+    pub(super) fn is_given(&self) -> bool {
+        let one = [&self.time, &self.layout].iter().any(|option| option.is_some());
+        one || self.dbc.is_some()
+            || [&self.from, &self.to].iter().any(|s| !s.is_empty())
+            || !self.map.is_empty()
+    }
+
+    /// What a file holds, its channels named and cut as asked; of frames, if those are wanted, as they are.
+    pub(super) fn read(&self, path: &Path, wants_frames: bool) -> Result<Contents, BadInput> {
+        let named = in_file::<RecordingError>(path);
+        if let Some(layout) = self.layout()? {
+            let bytes = std::fs::read(path).map_err(in_file(path))?;
+            let table = layout.recording(&bytes, Format::from_path(path).ok(), &self.maps()?);
+            let table = table.map_err(in_file(path))?;
+            return Ok(Contents::Channels(self.cut(table)?));
+        }
+        let mut terms = Vec::new();
+        for map in &self.map {
+            let wanted = || format!("--map {map}: NAME=CHANNEL is wanted");
+            let (name, channel) = map.split_once('=').ok_or_else(wanted)?;
+            let term = channel.parse::<Term>().map_err(|e| format!("--map {map}: {e}"))?;
+            terms.push((name.trim().to_owned(), term));
+        }
+        let time = self.time.as_deref().map(str::parse).transpose();
+        let mut time: Option<Term> = time.map_err(|e| format!("--time: {e}"))?;
+        if let Some(place) = terms.iter().position(|(name, _)| name == "time_s") {
+            let (_, term) = terms.remove(place);
+            if time.replace(term).is_some() {
+                return Err("--time and --map time_s=CHANNEL: one of them is wanted".into());
+            }
+        }
+        let reading = Reading {
+            time: time.as_ref(),
+            only: None,
+        };
+        let (bar, through) = progress::reading(path);
+        let contents = formats::read(path, reading, |file: File| -> Box<dyn Read> { through(file) });
+        bar.finish_and_clear();
+        let recording = match contents? {
+            Contents::Frames(frames, notes) if wants_frames => return Ok(Contents::Frames(frames, notes)),
+            Contents::Channels(recording) => recording,
+            Contents::Frames(frames, notes) => {
+                let dbc = match &self.dbc {
+                    Some(path) => std::fs::read_to_string(path).map_err(in_file(path))?,
+                    None => HAPTIC_DBC.to_owned(),
+                };
+                let mut recording = formats::dbc::channels(&frames, &dbc).map_err(&named)?;
+                recording.notes.append(notes);
+                recording
+            }
+        };
+        let recording = recording.renamed(&terms).map_err(&named)?;
+        Ok(Contents::Channels(self.cut(recording)?))
+    }
+
+    /// The channels of a file as a CSV table.
+    pub(super) fn table(&self, path: &Path) -> Result<Vec<u8>, BadInput> {
+        let Contents::Channels(recording) = self.read(path, false)? else {
+            return Err("channels are wanted, not frames".into());
+        };
+        print_reading(&recording.notes);
+        Ok(formats::to_csv(recording)?)
+    }
+
+    fn cut(&self, recording: Recording) -> Result<Recording, BadInput> {
+        Ok(recording.within(&self.stretches()?)?)
+    }
+
+    /// Longest pause that a grid bridges, s.
+    pub(super) fn max_gap(&self) -> f64 {
+        self.max_gap
+    }
 }
 
 impl RecordingArguments {
@@ -49,20 +201,7 @@ impl RecordingArguments {
         manual: bool,
         stretches: &[(f64, f64)],
     ) -> Result<(DriveLog, Vec<String>), BadInput> {
-        let maps = self
-            .map
-            .iter()
-            .map(|map| map.parse())
-            .collect::<Result<Vec<Mapping>, _>>();
-        let maps = maps.map_err(|e| format!("--{e}"))?;
-        let layout = self.layout.as_deref().map(Layout::named).transpose()?;
-        let vehicle = self.vehicle.as_deref().map(load_scenario).transpose()?;
-        let recording = Recording {
-            dbc: self.dbc.as_deref(),
-            vehicle: vehicle.as_ref().map(single_track),
-            manual,
-            stretches,
-        };
-        Ok(open_mapped(path, layout.as_ref(), &maps, &recording)?)
+        self.reading
+            .open(path, manual, stretches, self.vehicle.as_deref())
     }
 }

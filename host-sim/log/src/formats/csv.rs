@@ -1,7 +1,7 @@
 //! CSV: a heading with units in the names or in brackets behind them, and numbers that are read back bit for bit.
 
 use std::collections::HashMap;
-use std::io::Read;
+use std::io::{Read, Write};
 
 use super::calendar::{self, Origin};
 use super::{Only, Table};
@@ -141,8 +141,7 @@ pub(super) fn headings(texts: &[String]) -> Vec<Series> {
     texts.iter().map(series).collect()
 }
 
-pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
-    let mut out = Vec::new();
+pub(super) fn write(group: &Group, out: impl Write) -> Result<(), RecordingError> {
     let names = group.channels.iter().map(|channel| {
         let said = units::of_name(&channel.name) == Some(channel.unit.as_str());
         if said || ["", "1"].contains(&channel.unit.as_str()) {
@@ -152,7 +151,7 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
         }
     });
     let mut table =
-        TableWriter::new(&mut out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)?;
+        TableWriter::new(out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)?;
     let text = |value: f64| match value.is_nan() {
         true => String::new(),
         false => value.to_string(),
@@ -163,6 +162,5 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
             .row(std::iter::once(*time_s).chain(values).map(text))
             .map_err(refuse)?;
     }
-    table.finish().map_err(refuse)?;
-    Ok(out)
+    table.finish().map_err(refuse)
 }

@@ -3,10 +3,12 @@
 //! Read are real vectors of any class, plain or compressed, and matrices of a few of them beside each other. The crate matfile is not used: it reads numbers alone, so the
 //! units would be lost.
 
+use std::io::Write;
+
 use super::Table;
 use super::bytes::{Budget, Bytes};
 use crate::notes::Fate;
-use crate::recording::{Group, RecordingError, Series, Term};
+use crate::recording::{Group, RecordingError, Series, Term, refuse};
 use crate::units;
 
 const MATRIX: u32 = 14;
@@ -275,7 +277,7 @@ fn valid(name: &str) -> Result<String, RecordingError> {
     Ok(valid)
 }
 
-pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
+pub(super) fn write(group: &Group, to: &mut impl Write) -> Result<(), RecordingError> {
     let mut heading = b"MATLAB 5.0 MAT-file, written by haptic-guidance".to_vec();
     heading.resize(124, b' ');
     heading.extend_from_slice(&[0, 1, b'I', b'M']);
@@ -292,6 +294,8 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     for (name, _, _, values) in &all {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         put_matrix(&mut out, DOUBLE, [rows, 1], name, &[(9, &bytes)])?;
+        to.write_all(&out).map_err(refuse)?;
+        out.clear();
     }
     let texts: [(&str, Vec<&str>); 2] = [
         ("units", all.iter().map(|(_, unit, ..)| *unit).collect()),
@@ -313,5 +317,5 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
         let parts: [(u32, &[u8]); 3] = [(5, &length), (1, &names), (MATRIX, &fields)];
         put_matrix(&mut out, STRUCT, [1, 1], what, &parts)?;
     }
-    Ok(out)
+    to.write_all(&out).map_err(refuse)
 }

@@ -27,7 +27,7 @@ mod mdf;
 mod parquet;
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufWriter, Read, Write};
 use std::path::Path;
 
 use crate::candump::{self, CandumpFrame};
@@ -305,29 +305,69 @@ fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, Recordi
     .settled()
 }
 
-/// Writes channels into the file at `path`.
+/// Writes channels into the file at `path`: beside it first, so that a file that is there is replaced by a whole one.
 ///
 /// # Errors
 /// A format of frames, channels that it cannot hold, what the disk says; with the file.
 pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
-    let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::from_path(path)? {
-        Format::Csv => csv::write(&recording.into_one_group().map_err(named)?),
-        Format::Mat => mat::write(&recording.into_one_group().map_err(named)?),
-        Format::Mdf4 => mdf::write(&recording),
+    let format = Format::from_path(path)?;
+    replaced(path, |out| {
+        match format {
+        Format::Csv => csv::write(&recording.into_one_group()?, out),
+        Format::Mat => mat::write(&recording.into_one_group()?, out),
+        Format::Mdf4 => whole(out, mdf::write(&recording)?),
         #[cfg(feature = "mcap")]
-        Format::Mcap => mcap::write(&recording),
+        Format::Mcap => whole(out, mcap::write(&recording)?),
         #[cfg(not(feature = "mcap"))]
         Format::Mcap => Err("this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap".into()),
         #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::write(&recording.into_one_group().map_err(named)?),
+        Format::Parquet => parquet::write(&recording.into_one_group()?, out),
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => Err(NO_PARQUET.to_owned().into()),
         Format::Candump | Format::Asc | Format::Blf => Err(
             "a table of channels has no frames, and a bus log nothing else; `host-sim run --bus-log` records the bus".into(),
         ),
+    }
+    })
+}
+
+/// Channels as the text of a CSV file.
+///
+/// # Errors
+/// Two channels of one name.
+pub fn to_csv(recording: Recording) -> Result<Vec<u8>, RecordingError> {
+    let mut text = Vec::new();
+    csv::write(&recording.into_one_group()?, &mut text)?;
+    Ok(text)
+}
+
+fn whole(out: &mut Out, bytes: Vec<u8>) -> Result<(), RecordingError> {
+    out.write_all(&bytes).map_err(refuse)
+}
+
+/// A file under way.
+type Out = BufWriter<File>;
+
+/// Puts what `write` writes in the place of the file at `path`; where that fails, the file stays as it is. What a kill leaves
+/// beside it is in nobody's way.
+fn replaced(
+    path: &Path,
+    write: impl FnOnce(&mut Out) -> Result<(), RecordingError>,
+) -> Result<(), RecordingError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let beside = path.with_file_name(format!(".{name}.{}", std::process::id()));
+    let made = || -> Result<(), RecordingError> {
+        let mut out = BufWriter::new(File::create(&beside).map_err(refuse)?);
+        write(&mut out)?;
+        let file = out.into_inner().map_err(refuse)?;
+        file.sync_all().map_err(refuse)?;
+        std::fs::rename(&beside, path).map_err(refuse)
     };
-    std::fs::write(path, bytes.map_err(named)?).map_err(|e| named(e.to_string().into()))
+    made().map_err(|e| {
+        // If it cannot be removed either, the disk has said why.
+        let _ = std::fs::remove_file(&beside);
+        RecordingError(format!("{}: {e}", path.display()))
+    })
 }
 
 /// Writes frames into the file at `path`.
@@ -335,18 +375,13 @@ pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
 /// # Errors
 /// A format of channels, what the disk says; with the file.
 pub fn write_frames(path: &Path, frames: &[CandumpFrame]) -> Result<(), RecordingError> {
-    let named = |e: String| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::from_path(path)? {
-        Format::Candump => {
-            let mut out = Vec::new();
-            for frame in frames {
-                candump::write_frame(&mut out, frame).map_err(|e| named(e.to_string()))?;
-            }
-            out
-        }
-        Format::Asc => asc::write(frames),
-        Format::Blf => blf::write(frames),
-        _ => return Err(named("frames become channels by a DBC file first".into())),
-    };
-    std::fs::write(path, bytes).map_err(|e| named(e.to_string()))
+    let format = Format::from_path(path)?;
+    replaced(path, |out| match format {
+        Format::Candump => frames
+            .iter()
+            .try_for_each(|frame| candump::write_frame(out, frame).map_err(refuse)),
+        Format::Asc => whole(out, asc::write(frames)),
+        Format::Blf => whole(out, blf::write(frames)),
+        _ => Err("frames become channels by a DBC file first".into()),
+    })
 }

@@ -4,6 +4,7 @@
 mod nesting;
 mod pages;
 
+use std::io::Write;
 use std::sync::Arc;
 
 use bytes::Bytes;
@@ -247,7 +248,7 @@ fn append(
     }
 }
 
-pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
+pub(super) fn write(group: &Group, out: impl Write + Send) -> Result<(), RecordingError> {
     let time = Series {
         name: "time_s".into(),
         unit: "s".into(),
@@ -283,9 +284,8 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
             Value::Array(channels).to_string(),
         )]))
         .build();
-    let mut out = Vec::new();
     let mut writer =
-        SerializedFileWriter::new(&mut out, Arc::new(schema), Arc::new(properties)).map_err(refuse)?;
+        SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties)).map_err(refuse)?;
     let mut rows = writer.next_row_group().map_err(refuse)?;
     for channel in all {
         let Some(mut column) = rows.next_column().map_err(refuse)? else {
@@ -301,5 +301,5 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     }
     rows.close().map_err(refuse)?;
     writer.close().map_err(refuse)?;
-    Ok(out)
+    Ok(())
 }

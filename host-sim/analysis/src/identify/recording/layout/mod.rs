@@ -122,8 +122,8 @@ impl Layout {
 
     /// Whether a file has all channels of this layout.
     #[must_use]
-    pub fn fits(&self, bytes: &[u8], format: Option<Format>) -> bool {
-        self.table(bytes, format, &[]).is_ok()
+    pub fn fits(&self, bytes: &[u8], format: Option<Format>, maps: &[Mapping]) -> bool {
+        self.table(bytes, format, maps).is_ok()
     }
 
     /// The log in a file's bytes: of the stretches by hand, or of those shared with an automation.
@@ -213,6 +213,27 @@ impl Layout {
             ));
         }
         Ok((time_s, table))
+    }
+
+    /// Its columns, with what can be computed of them, as a recording.
+    ///
+    /// # Errors
+    /// As [`Layout::signals`].
+    pub fn recording(
+        &self,
+        bytes: &[u8],
+        format: Option<Format>,
+        maps: &[Mapping],
+    ) -> Result<Recording, LogError> {
+        let (time_s, mut table) = self.signals(bytes, format, maps)?;
+        two_points(&mut table, step_of(&time_s).0);
+        let channels = table.into_iter().map(|(name, values)| Series {
+            unit: units::of_name(&name).unwrap_or_default().into(),
+            source: self.name.clone(),
+            name,
+            values,
+        });
+        Ok(Recording::of(Group::new(time_s, channels.collect())))
     }
 
     /// The time and the columns, those mapped by the caller in place of the layout's.
