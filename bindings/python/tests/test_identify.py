@@ -207,9 +207,9 @@ def test_a_recording_of_the_bus_takes_another_vehicle_and_another_bus(tmp_path):
         (dict(map={"e_y": "t"}), 'e_y=t: "e_y" is none of time_s'),
         (dict(map={"e_y_m": "Offset"}), "there is no channel Offset"),
         (dict(map={"e_y_m": "Comment"}), "there is no channel Comment"),
-        (dict(map={"e_y_m": "t*0"}), "the scale is no number other than 0"),
-        (dict(map={"e_y_m": "t*inf"}), "the scale is no number other than 0"),
-        (dict(map={"e_y_m": "t*wide"}), "the scale is no number other than 0"),
+        (dict(map={"e_y_m": "t*0"}), "the factor "[a-z0-9]*" is no number other than 0"),
+        (dict(map={"e_y_m": "t*inf"}), "the factor "[a-z0-9]*" is no number other than 0"),
+        (dict(map={"e_y_m": "t*wide"}), "the factor "[a-z0-9]*" is no number other than 0"),
         (dict(dbc="core/haptic.dbc"), "dbc: only for a recording of the bus"),
         (dict(vehicle=hg.Scenario()), "vehicle: only for a recording of the bus"),
         (dict(layout="openlka"), "layout: only for a file"),
@@ -221,7 +221,7 @@ def test_a_mapping_that_cannot_be_is_refused(options, says):
 
 
 def test_a_mapping_of_a_file_is_refused_by_name():
-    for given, says in [({"e_y": "t"}, "e_y"), ({"e_y_m": "none"}, "none"), ({"e_y_m": "t*0"}, "scale")]:
+    for given, says in [({"e_y": "t"}, "e_y"), ({"e_y_m": "none"}, "none"), ({"e_y_m": "t*0"}, "factor")]:
         with pytest.raises(hg.InputError, match=says):
             hg.identify(LOGS / "guided-probe-clean.csv", map=given)
 

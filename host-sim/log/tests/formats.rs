@@ -112,14 +112,14 @@ fn no_even_grid_spans_a_clock_that_was_set() {
     for time_s in &mut jumped.groups[0].time_s[100..] {
         *time_s += 1.7e9;
     }
-    let error = jumped.resampled(100.0).unwrap_err().to_string();
+    let error = jumped.resampled(100.0, None).unwrap_err().to_string();
     assert!(
         error.starts_with("channel Torque: its time goes from 0.495 to 1700000000.5 s"),
         "{error}"
     );
-    let error = recording().resampled(2e7).unwrap_err().to_string();
+    let error = recording().resampled(2e7, None).unwrap_err().to_string();
     assert!(error.contains("give a lower --rate"), "{error}");
-    assert_eq!(recording().resampled(100.0).unwrap().time_s.len(), 100);
+    assert_eq!(recording().resampled(100.0, None).unwrap().time_s.len(), 100);
 }
 
 /// Every tenth length, and twelve hundred files with bytes overwritten, some of them sizes and links: each is read or refused in one

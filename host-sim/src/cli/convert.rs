@@ -17,7 +17,7 @@ pub(super) struct Arguments {
     /// Recording to read; its extension says the format: .csv, .parquet, .mat, .mf4, .log (candump), .asc, .blf
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// File to write, in the format of its extension: one of those, or .mcap. Without it the channels are listed
+    /// File to write, in the format of its extension, one of those. Without it the channels are listed
     #[arg(value_name = "OUT")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -77,7 +77,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let named = in_file::<RecordingError>(&arguments.input);
     if let Some(rate_hz) = arguments.rate {
-        let even = recording.resampled(rate_hz).map_err(&named)?;
+        let even = recording
+            .resampled(rate_hz, arguments.reading.max_gap()?)
+            .map_err(&named)?;
         recording.groups = vec![even];
     }
     let table = recording.table();

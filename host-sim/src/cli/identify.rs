@@ -77,6 +77,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let course = arguments.course.open()?;
     let output = arguments.results.begin("identify")?;
     let (log, converted) = arguments.recording.open(arguments.manual, &options.stretches)?;
+    if log.approximate_points {
+        eprintln!(
+            "note: e_y and e_theta are made of offset and curvature of the lane, which is too rough for the driver's gains: k_hg alone \
+             can be identified{}",
+            if arguments.manual {
+                ", and not by hand: this fit will have no verdict"
+            } else {
+                ""
+            }
+        );
+    }
     let name = arguments.recording.log.display().to_string();
     let mut drive = if arguments.pieces {
         if method == Method::Paper {

@@ -38,9 +38,9 @@ pub(super) struct ReadingArguments {
     #[arg(long, value_name = "S")]
     to: Vec<f64>,
     /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
-    /// ones; 0 cuts at each
-    #[arg(long, value_name = "S", default_value_t = 0.3)]
-    max_gap: f64,
+    /// ones; 0 cuts at each; default: 0.3, and in `convert --rate` any
+    #[arg(long, value_name = "S")]
+    max_gap: Option<f64>,
     /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
@@ -64,8 +64,9 @@ impl ReadingArguments {
     /// Takes stretches and gaps into the options of a fit.
     pub(super) fn choose(&self, options: &mut Options) -> Result<(), BadInput> {
         options.between(&self.from, &self.to)?;
-        in_range("--max-gap", self.max_gap, 0.0..=1.0, "s")?;
-        options.bridge_s = self.max_gap;
+        if let Some(max_gap) = self.max_gap()? {
+            options.bridge_s = max_gap;
+        }
         Ok(())
     }
 
@@ -178,9 +179,12 @@ impl ReadingArguments {
         Ok(recording.within(&self.stretches()?)?)
     }
 
-    /// Longest pause that a grid bridges, s.
-    pub(super) fn max_gap(&self) -> f64 {
-        self.max_gap
+    /// Longest pause that is bridged, s, if it is given.
+    pub(super) fn max_gap(&self) -> Result<Option<f64>, BadInput> {
+        if let Some(max_gap) = self.max_gap {
+            in_range("--max-gap", max_gap, 0.0..=1.0, "s")?;
+        }
+        Ok(self.max_gap)
     }
 }
 

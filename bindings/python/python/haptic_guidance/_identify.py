@@ -178,6 +178,7 @@ def identify(
     preprocessing: bool = True,
     lane_smoothing: bool = True,
     map: Optional[Mapping[str, str]] = None,
+    time: Optional[str] = None,
     layout: Union[str, os.PathLike[str], None] = None,
     dbc: Union[str, os.PathLike[str], None] = None,
     vehicle: Optional[Scenario] = None,
@@ -213,7 +214,9 @@ def identify(
         False takes the lane signals as they are: no camera noise is estimated and removed.
     map : mapping of str to str, optional
         Columns of another name or unit, such as ``{"wheel_angle_rad": "SteeringAngle*0.0174533"}`` or
-        ``{"speed_m_per_s": "Speed [km/h]"}``. Without a scale the unit is converted if the file or the name says it.
+        ``{"speed_m_per_s": "Speed [km/h]"}``. Without unit and factor the unit is converted if the file or the name says it.
+    time : str, optional
+        The channel that is the time, if it is not ``time_s``, with a unit or a factor as in `map`.
     layout : str or path, optional
         Whose recording the file is: ``"openlka"``, ``"openpilot"``, ``"sadc"``, ``"udacity"``, ``"cognitive-driver-model"``, or a
         layout of one's own (``.toml``). Of a drive that an automation shares in turns, `manual` takes the stretches by hand,
@@ -236,6 +239,8 @@ def identify(
     fixed = [f"{name}={float(value)!r}" for name, value in (fix or {}).items()]
     wanted = [name if ends is None else f"{name}={ends[0]!r}..{ends[1]!r}" for name, ends in (estimate or {}).items()]
     maps = dict(map or {})
+    if time is not None and maps.setdefault("time_s", time) != time:
+        raise InputError("time: map names time_s too")
     if isinstance(also, (str, os.PathLike, Mapping, Run)):
         raise InputError("also: a list of drives is wanted")
     if also and as_published:

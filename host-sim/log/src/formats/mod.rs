@@ -58,12 +58,13 @@ pub enum Format {
 }
 
 /// Extensions and their formats; the first of a format is the usual one.
-const EXTENSIONS: [(&str, Format); 10] = [
+const EXTENSIONS: &[(&str, Format)] = &[
     ("csv", Format::Csv),
     ("parquet", Format::Parquet),
     ("mat", Format::Mat),
     ("mf4", Format::Mdf4),
     ("mdf", Format::Mdf4),
+    #[cfg(feature = "mcap")]
     ("mcap", Format::Mcap),
     ("log", Format::Candump),
     ("candump", Format::Candump),
@@ -81,6 +82,9 @@ impl Format {
         let extension = extension.to_lowercase();
         let found = EXTENSIONS.iter().find(|(known, _)| *known == extension);
         found.map(|(_, format)| *format).ok_or_else(|| {
+            if extension == "mcap" {
+                return NO_MCAP.into();
+            }
             let known: Vec<String> = EXTENSIONS.iter().map(|(known, _)| format!(".{known}")).collect();
             let what = if extension.is_empty() {
                 "no extension".into()
@@ -239,6 +243,8 @@ pub fn table(columns: Vec<(String, Vec<f64>)>, time: Option<&Term>) -> Result<Re
     with_time(table, time)
 }
 
+const NO_MCAP: &str = "this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap";
+
 #[cfg(not(feature = "parquet"))]
 const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the command line host-sim does";
 
@@ -319,7 +325,7 @@ pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
         #[cfg(feature = "mcap")]
         Format::Mcap => whole(out, mcap::write(&recording)?),
         #[cfg(not(feature = "mcap"))]
-        Format::Mcap => Err("this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap".into()),
+        Format::Mcap => Err(NO_MCAP.into()),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::write(&recording.into_one_group()?, out),
         #[cfg(not(feature = "parquet"))]
@@ -355,7 +361,7 @@ fn replaced(
     write: impl FnOnce(&mut Out) -> Result<(), RecordingError>,
 ) -> Result<(), RecordingError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let beside = path.with_file_name(format!(".{name}.{}", std::process::id()));
+    let beside = path.with_file_name(format!("{name}.{}.unfinished", std::process::id()));
     let made = || -> Result<(), RecordingError> {
         let mut out = BufWriter::new(File::create(&beside).map_err(refuse)?);
         write(&mut out)?;
