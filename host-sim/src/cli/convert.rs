@@ -10,7 +10,7 @@ use haptic_log::recording::{Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
-use super::{BadInput, Outcome, in_file, output, print, print_json, width};
+use super::{BadInput, Outcome, in_file, output, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -23,6 +23,9 @@ pub(super) struct Arguments {
     /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
+    /// The bus of a recording of several, by its name there: an interface (can0) or the number of a channel (1)
+    #[arg(long, value_name = "NAME")]
+    bus: Option<String>,
     /// The channel that is the time, if it is not time_s
     #[arg(long, value_name = "CHANNEL[*SCALE]")]
     time: Option<String>,
@@ -67,29 +70,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
     let contents = formats::read(&arguments.input, time.as_ref())?;
-    if let (Contents::Frames(frames, notes), Some(output), Some(format)) =
-        (&contents, &arguments.output, target)
-        && format.holds_frames()
-    {
-        if arguments.rate.is_some() {
-            return Err("--rate is for channels, not for frames".into());
-        }
-        formats::write_frames(output, frames)?;
-        print_reading(notes);
-        eprintln!("{}: {} frames", output.display(), frames.len());
-        return Ok(Outcome::Good);
-    }
     let named = in_file::<RecordingError>(&arguments.input);
     let mut recording = match contents {
         Contents::Channels(recording) => recording,
-        Contents::Frames(frames, notes) => {
+        Contents::Frames(log) => {
+            let log = log.of_bus(arguments.bus.as_deref());
+            let (log, bar) = progress::of_log(log);
+            if let (Some(output), Some(true)) = (&arguments.output, target.map(Format::holds_frames)) {
+                if arguments.rate.is_some() {
+                    return Err("--rate is for channels, not for frames".into());
+                }
+                let (count, notes) = formats::write_frames(output, &log)?;
+                bar.finish_and_clear();
+                print_reading(&notes);
+                eprintln!("{}: {count} frames", output.display());
+                return Ok(Outcome::Good);
+            }
             let dbc = match &arguments.dbc {
-                Some(path) => std::fs::read_to_string(path).map_err(in_file(path))?,
-                None => HAPTIC_DBC.to_owned(),
+                Some(path) => std::fs::read(path).map_err(in_file(path))?,
+                None => HAPTIC_DBC.into(),
             };
-            let mut recording = formats::dbc::channels(&frames, &dbc).map_err(&named)?;
-            recording.notes.append(notes);
-            recording
+            let recording = formats::dbc::channels(&log, &dbc);
+            bar.finish_and_clear();
+            recording.map_err(&named)?
         }
     };
     if let Some(rate_hz) = arguments.rate {

@@ -18,6 +18,9 @@ pub(super) struct RecordingArguments {
     /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
+    /// The bus of a recording of several, by its name there: an interface (can0) or the number of a channel (1)
+    #[arg(long, value_name = "NAME")]
+    bus: Option<String>,
     /// The vehicle of a recording of the bus, if not that of table 9: a scenario file whose [vehicle] says what it is. The
     /// bus does not carry the driver's far point; it is computed with this vehicle
     #[arg(long, value_name = "FILE.toml")]
@@ -59,6 +62,7 @@ impl RecordingArguments {
         let vehicle = self.vehicle.as_deref().map(load_scenario).transpose()?;
         let recording = Recording {
             dbc: self.dbc.as_deref(),
+            bus: self.bus.as_deref(),
             vehicle: vehicle.as_ref().map(single_track),
             manual,
             stretches,

@@ -1,6 +1,7 @@
 //! CSV: a heading with units in the names or in brackets behind them, and numbers that are read back bit for bit.
 
 use std::collections::HashMap;
+use std::io::Write;
 
 use crate::recording::{Group, RecordingError, Series, refuse};
 use crate::table::{TableError, TableReader, TableWriter, number};
@@ -64,20 +65,7 @@ pub(super) fn headings(texts: &[String]) -> Vec<Series> {
 
 pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     let mut out = Vec::new();
-    let names = group.channels.iter().map(|channel| {
-        let said = units::of_name(&channel.name) == Some(channel.unit.as_str());
-        if said || ["", "1"].contains(&channel.unit.as_str()) {
-            channel.name.clone()
-        } else {
-            format!("{} [{}]", channel.name, channel.unit)
-        }
-    });
-    let mut table =
-        TableWriter::new(&mut out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)?;
-    let text = |value: f64| match value.is_nan() {
-        true => String::new(),
-        false => value.to_string(),
-    };
+    let mut table = begin(&mut out, &group.channels)?;
     for (k, time_s) in group.time_s.iter().enumerate() {
         let values = group.channels.iter().map(|channel| channel.values[k]);
         table
@@ -86,4 +74,24 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     }
     table.finish().map_err(refuse)?;
     Ok(out)
+}
+
+/// A table with its heading: the names of the channels, with the unit in brackets where the name does not say it.
+pub(super) fn begin<W: Write>(out: W, channels: &[Series]) -> Result<TableWriter<W>, RecordingError> {
+    let names = channels.iter().map(|channel| {
+        let said = units::of_name(&channel.name) == Some(channel.unit.as_str());
+        if said || ["", "1"].contains(&channel.unit.as_str()) {
+            channel.name.clone()
+        } else {
+            format!("{} [{}]", channel.name, channel.unit)
+        }
+    });
+    TableWriter::new(out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)
+}
+
+pub(super) fn text(value: f64) -> String {
+    match value.is_nan() {
+        true => String::new(),
+        false => value.to_string(),
+    }
 }

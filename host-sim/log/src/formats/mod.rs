@@ -13,8 +13,9 @@
 //! What holds frames needs a DBC file to become channels. A file that is damaged is refused in one sentence: nothing here
 //! indexes or allocates by what a file says without a look at how much there is. `tests/fuzz_readers/` holds that.
 
-pub mod asc;
-pub mod blf;
+mod asc;
+mod blf;
+mod bus_log;
 mod bytes;
 mod calendar;
 mod csv;
@@ -28,8 +29,8 @@ mod parquet;
 
 use std::path::Path;
 
-use crate::candump::{self, CandumpFrame};
-use crate::notes::Notes;
+pub use bus_log::{BusLog, write_frames};
+
 use crate::recording::{Group, Recording, RecordingError, Series};
 use crate::units;
 
@@ -101,28 +102,24 @@ impl Format {
 }
 
 /// What a file holds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Contents {
     /// Channels.
     Channels(Recording),
-    /// Frames of a bus, in the order of the file, and what else it holds.
-    Frames(Vec<CandumpFrame>, Notes),
+    /// Frames of a bus, which are read when they are needed.
+    Frames(BusLog),
 }
 
 impl Contents {
     /// # Errors
-    /// Neither a value nor a frame, with what there is otherwise.
+    /// No value of any channel, with what there is otherwise.
     fn not_empty(self) -> Result<Self, RecordingError> {
-        let (is_empty, what, notes) = match &self {
-            Self::Frames(frames, notes) => (frames.is_empty(), "frame", notes),
-            Self::Channels(recording) => {
-                let mut channels = recording.groups.iter().flat_map(|group| &group.channels);
-                let is_empty = channels.all(|channel| channel.values.iter().all(|value| value.is_nan()));
-                (is_empty, "channel with a number", &recording.notes)
+        if let Self::Channels(recording) = &self {
+            let mut channels = recording.groups.iter().flat_map(|group| &group.channels);
+            if channels.all(|channel| channel.values.iter().all(|value| value.is_nan())) {
+                let aside = recording.notes.aside();
+                return Err(format!("there is no channel with a number in it{aside}").into());
             }
-        };
-        if is_empty {
-            return Err(format!("there is no {what} in it{}", notes.aside()).into());
         }
         Ok(self)
     }
@@ -144,6 +141,9 @@ pub struct TimeColumn {
 pub fn read(path: &Path, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
     let format = Format::from_path(path)?;
     let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
+    if format.holds_frames() {
+        return Ok(Contents::Frames(BusLog::of_file(path, format).map_err(named)?));
+    }
     let bytes = std::fs::read(path).map_err(|e| named(e.to_string().into()))?;
     read_bytes(bytes, format, time).map_err(named)
 }
@@ -163,16 +163,10 @@ pub fn read_bytes(
 }
 
 fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
-    let text = |bytes: Vec<u8>| {
-        String::from_utf8(bytes).map_err(|e| {
-            let place = e.utf8_error().valid_up_to();
-            RecordingError(format!("byte {place}: this is no text"))
-        })
-    };
     let table = match format {
-        Format::Candump => return Ok(Contents::Frames(candump::parse(&text(bytes)?)?, Notes::default())),
-        Format::Asc => return Ok(Contents::Frames(asc::parse(&text(bytes)?)?, Notes::default())),
-        Format::Blf => return Ok(Contents::Frames(blf::parse(&bytes)?, Notes::default())),
+        Format::Candump | Format::Asc | Format::Blf => {
+            return Ok(Contents::Frames(BusLog::of_bytes(bytes, format)));
+        }
         Format::Mdf4 => return Ok(Contents::Channels(mdf::read(&bytes)?.described().settled()?)),
         Format::Mcap => {
             return Err("MCAP is written, not read: convert from what it was made of".into());
@@ -265,25 +259,4 @@ pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
         ),
     };
     std::fs::write(path, bytes.map_err(named)?).map_err(|e| named(e.to_string().into()))
-}
-
-/// Writes frames into the file at `path`.
-///
-/// # Errors
-/// A format of channels, what the disk says; with the file.
-pub fn write_frames(path: &Path, frames: &[CandumpFrame]) -> Result<(), RecordingError> {
-    let named = |e: String| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::from_path(path)? {
-        Format::Candump => {
-            let mut out = Vec::new();
-            for frame in frames {
-                candump::write_frame(&mut out, frame).map_err(|e| named(e.to_string()))?;
-            }
-            out
-        }
-        Format::Asc => asc::write(frames),
-        Format::Blf => blf::write(frames),
-        _ => return Err(named("frames become channels by a DBC file first".into())),
-    };
-    std::fs::write(path, bytes).map_err(|e| named(e.to_string()))
 }

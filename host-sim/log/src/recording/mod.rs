@@ -149,8 +149,13 @@ impl Recording {
     pub fn table(&self) -> Vec<Line> {
         let line = |(group, channel): (&Group, &Series)| {
             let (there, _) = channel.present_values(group);
+            let many = self.channels().filter(|(_, c)| c.name == channel.name).count() > 1;
             Line {
-                name: channel.name.clone(),
+                name: if many {
+                    format!("{}.{}", group.name, channel.name)
+                } else {
+                    channel.name.clone()
+                },
                 unit: channel.unit.clone(),
                 source: channel.source.clone(),
                 sample_rate_hz: rate_hz(&there),

@@ -10,9 +10,11 @@ mod instants;
 mod layout;
 mod mapping;
 
+use std::io::Read;
 use std::path::Path;
 
-use haptic_log::formats::{self, Contents, Format, TimeColumn};
+use haptic_log::candump;
+use haptic_log::formats::{self, BusLog, Contents, Format, TimeColumn};
 use haptic_log::notes::Note;
 use haptic_log::recording::{Group, Recording, RecordingError, Series};
 use haptic_log::table::TableReader;
@@ -45,9 +47,44 @@ pub fn open(
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
+    let named = |e: LogError| LogError::in_file(path.display(), e);
+    let format = Format::from_path(path).ok();
+    let mut head = Vec::new();
+    let opened = std::fs::File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    opened.map_err(|e| LogError::in_file(path.display(), e))?;
+    if let Some(format) = bus_format(format, &head).filter(|_| layout.is_none()) {
+        let log = BusLog::of_file(path, format).map_err(LogError::from);
+        let read = log.and_then(|log| once(maps).and_then(|()| of_bus(log, maps, how)));
+        return read.map_err(named);
+    }
     let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
-    of_bytes(bytes, Format::from_path(path).ok(), layout, maps, how)
-        .map_err(|e| LogError::in_file(path.display(), e))
+    of_bytes(bytes, format, layout, maps, how).map_err(named)
+}
+
+/// How much of a text shows whether it is a table or a trace.
+const HEAD: u64 = 1 << 16;
+
+/// The format of frames that a file has; a text is told by its looks.
+fn bus_format(format: Option<Format>, head: &[u8]) -> Option<Format> {
+    match format {
+        None | Some(Format::Csv | Format::Candump) => {
+            candump::looks_like_one(head).then_some(Format::Candump)
+        }
+        Some(format) => format.holds_frames().then_some(format),
+    }
+}
+
+fn of_bus(
+    log: BusLog,
+    maps: &[Mapping],
+    how: &bus_trace::Recording<'_>,
+) -> Result<(DriveLog, Vec<String>), LogError> {
+    if maps.is_empty() {
+        let (log, note) = bus_trace::of_bus(log, how)?;
+        return Ok((log, vec![note.into()]));
+    }
+    let dbc = bus_trace::dbc_file(how.dbc)?;
+    of_channels(&formats::dbc::channels(&log.of_bus(how.bus), &dbc)?, maps, how)
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.
@@ -65,28 +102,20 @@ pub fn of_bytes(
     if let Some(layout) = layout {
         return layout.read(&bytes, format, maps, how);
     }
-    // Text files keep their own readers: those name lines, and tell a table from a trace by its looks.
+    if let Some(format) = bus_format(format, &bytes) {
+        return of_bus(BusLog::of_bytes(bytes, format), maps, how);
+    }
+    // A CSV file keeps its own reader, which names lines.
     let is_text = matches!(format, None | Some(Format::Csv | Format::Candump));
     if maps.is_empty() && is_text && !has_units(&bytes) {
-        let (log, note) = bus_trace::of_text(&bytes, how)?;
-        return Ok((log, note.map(String::from).into_iter().collect()));
+        let log = DriveLog::read_within(&bytes[..], how.manual, how.stretches)?;
+        return Ok((log, Vec::new()));
     }
     let contents = formats::read_bytes(bytes, format.unwrap_or(Format::Csv), time_of(maps).as_ref());
-    let recording = match contents? {
-        Contents::Frames(frames, notes) if maps.is_empty() => {
-            let (mut log, note) = bus_trace::of_frames(&frames, how)?;
-            log.findings.extend(notes.iter().map(Note::finding));
-            return Ok((log, vec![note.into()]));
-        }
-        Contents::Frames(frames, notes) => {
-            let dbc = bus_trace::dbc_text(how.dbc)?;
-            let mut recording = formats::dbc::channels(&frames, &dbc)?;
-            recording.notes.append(notes);
-            recording
-        }
-        Contents::Channels(recording) => recording,
-    };
-    of_channels(&recording, maps, how)
+    match contents? {
+        Contents::Frames(log) => of_bus(log, maps, how),
+        Contents::Channels(recording) => of_channels(&recording, maps, how),
+    }
 }
 
 /// The log of a table's columns in memory, by their names with or without units in brackets. What is not asked for may have
