@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use haptic_analysis::identify::{
     DriveLog, Identification, Layout, Options, Parameter, Recording, identify_with_noise_model, open_mapped,
 };
-use haptic_log::formats::{self, Format};
+use haptic_log::formats::{self, Format, Reading};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -191,7 +191,7 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> FileResu
     let format = Format::from_path(path).ok();
     let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format)) else {
         // A file that is broken says where; of a whole one only the time is missed.
-        let why = match formats::read_bytes(bytes, format.unwrap_or(Format::Csv), None) {
+        let why = match formats::read_bytes(bytes, format.unwrap_or(Format::Csv), Reading::default()) {
             Err(error) if !error.to_string().contains("there is no channel time_s") => error.to_string(),
             _ => "it has the channels of no layout that needs no --map".to_owned(),
         };

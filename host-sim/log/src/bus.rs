@@ -272,9 +272,9 @@ impl Numbers {
     }
 
     /// What names became, where the number does not tell.
-    pub(crate) fn tell(self, notes: &mut Notes) {
-        for (name, number) in self.0 {
-            if interface(&number.to_string()) != interface(&name) {
+    pub(crate) fn tell(&self, notes: &mut Notes) {
+        for (name, number) in &self.0 {
+            if interface(&number.to_string()) != interface(name) {
                 notes.channel(
                     Fate::Converted,
                     format!("{name} to {number}"),

@@ -6,6 +6,8 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
+use crate::recording::RecordingError;
+
 /// What became of a part of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -138,12 +140,18 @@ impl Notes {
         self.0.is_empty()
     }
 
-    /// Why a channel was left out, if it was.
+    /// Why there is no channel of this name, if it was left out.
     #[must_use]
-    pub fn why_left_out(&self, name: &str) -> Option<&str> {
-        let mut left_out = self.0.iter().filter(|note| note.fate == Fate::LeftOut);
-        let note = left_out.find(|note| note.names.iter().any(|own| own == name))?;
-        Some(&note.why)
+    pub fn left_out(&self, name: &str) -> Option<RecordingError> {
+        let is_it = |note: &&Note| {
+            note.fate == Fate::LeftOut && note.names.iter().any(|own| own.eq_ignore_ascii_case(name))
+        };
+        let why = &self.0.iter().find(is_it)?.why;
+        // A mistake in the file is all that there is to say.
+        Some(match why.starts_with("line ") {
+            true => why.as_str().into(),
+            false => format!("there is no channel {name}: it was left out ({why})").into(),
+        })
     }
 }
 
@@ -220,7 +228,11 @@ mod tests {
                 "1 time stamp mended: decimal comma, in line 1",
             ]
         );
-        assert_eq!(notes.why_left_out("mode"), Some("text"));
-        assert_eq!(notes.why_left_out("angle"), None);
+        let error = notes.left_out("mode").map(|e| e.to_string());
+        assert_eq!(
+            error.as_deref(),
+            Some("there is no channel mode: it was left out (text)")
+        );
+        assert_eq!(notes.left_out("angle"), None);
     }
 }

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use haptic_log::bus::{BusFrame, Form};
-use haptic_log::formats::{self, BusLog, Contents, Format};
+use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
 use haptic_log::recording::{Group, Recording, Series};
 
 fn series(name: &str, unit: &str, values: impl Iterator<Item = f64>) -> Series {
@@ -76,7 +76,7 @@ fn written(extension: &str) -> Vec<u8> {
 
 fn read(bytes: Vec<u8>, extension: &str) -> Result<Contents, String> {
     let format = Format::from_path(Path::new(&format!("x.{extension}"))).unwrap();
-    let contents = formats::read_bytes(bytes, format, None).map_err(|e| e.to_string())?;
+    let contents = formats::read_bytes(bytes, format, Reading::default()).map_err(|e| e.to_string())?;
     if let Contents::Frames(log) = &contents {
         log.each(&mut |_| Ok(())).map_err(|e| e.to_string())?;
     }

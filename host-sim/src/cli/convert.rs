@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_analysis::identify::HAPTIC_DBC;
-use haptic_log::formats::{self, Contents, Format, TimeColumn};
+use haptic_log::formats::dbc::Signals;
+use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
 use haptic_log::notes::Notes;
-use haptic_log::recording::{Recording, RecordingError};
+use haptic_log::recording::{Line, Recording, RecordingError, Term};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
@@ -56,7 +57,8 @@ struct Channel {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let time = arguments.time.as_deref().map(time_column).transpose()?;
+    let time = arguments.time.as_deref().map(str::parse::<Term>).transpose();
+    let time = time.map_err(|e| format!("--time: {e}"))?;
     if let Some(rate_hz) = arguments.rate.filter(|rate| !(0.1..=1e5).contains(rate)) {
         return Err(format!("--rate {rate_hz}: 0.1 to 100000 Hz is wanted").into());
     }
@@ -69,61 +71,88 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         ));
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
-    let contents = formats::read(&arguments.input, time.as_ref())?;
-    let named = in_file::<RecordingError>(&arguments.input);
-    let mut recording = match contents {
+    let reading = Reading {
+        time: time.as_ref(),
+        only: None,
+    };
+    let mut recording = match formats::read(&arguments.input, reading, |file| Box::new(file))? {
         Contents::Channels(recording) => recording,
         Contents::Frames(log) => {
-            let log = log.of_bus(arguments.bus.as_deref());
-            let (log, bar) = progress::of_log(log);
-            if let (Some(output), Some(true)) = (&arguments.output, target.map(Format::holds_frames)) {
-                if arguments.rate.is_some() {
-                    return Err("--rate is for channels, not for frames".into());
-                }
-                let (count, notes) = formats::write_frames(output, &log)?;
-                bar.finish_and_clear();
-                print_reading(&notes);
-                eprintln!("{}: {count} frames", output.display());
-                return Ok(Outcome::Good);
-            }
-            let dbc = match &arguments.dbc {
-                Some(path) => std::fs::read(path).map_err(in_file(path))?,
-                None => HAPTIC_DBC.into(),
-            };
-            let recording = formats::dbc::channels(&log, &dbc);
+            let (log, bar) = progress::of_log(log.of_bus(arguments.bus.as_deref()));
+            let read = of_bus(arguments, &log, target);
             bar.finish_and_clear();
-            recording.map_err(&named)?
+            match read? {
+                Some(recording) => recording,
+                None => return Ok(Outcome::Good),
+            }
         }
     };
     if let Some(rate_hz) = arguments.rate {
-        let even = recording.resampled(rate_hz).map_err(&named)?;
-        recording.groups = vec![even];
+        let even = recording.resampled(rate_hz);
+        recording.groups = vec![even.map_err(in_file(&arguments.input))?];
     }
-    let table = recording.table();
     let Some(output) = &arguments.output else {
-        if arguments.json {
-            let channels = table.into_iter().map(|line| Channel {
-                name: line.name,
-                unit: line.unit,
-                source: line.source,
-                sample_rate_hz: line.sample_rate_hz,
-                samples: line.samples,
-            });
-            print_json(&Listed {
-                channels: channels.collect(),
-                notes: &recording.notes,
-            })?;
-        } else {
-            let notes: String = recording.notes.iter().map(|note| format!("\n{note}")).collect();
-            let space = if notes.is_empty() { "" } else { "\n" };
-            print(&format!("{}{space}{notes}", listed(&recording).to_text(width())))?;
-        }
+        list(recording.table(), &recording.notes, arguments.json)?;
         return Ok(Outcome::Good);
     };
+    let count = recording.table().len();
     print_reading(&recording.notes);
     formats::write(output, recording)?;
-    eprintln!("{}: {} channels", output.display(), table.len());
+    eprintln!("{}: {count} channels", output.display());
     Ok(Outcome::Good)
+}
+
+/// What a log of frames becomes, where that needs its whole table; all else is done here, frame by frame.
+fn of_bus(
+    arguments: &Arguments,
+    log: &BusLog,
+    target: Option<Format>,
+) -> Result<Option<Recording>, BadInput> {
+    let named = in_file::<RecordingError>(&arguments.input);
+    if let (Some(output), Some(true)) = (&arguments.output, target.map(Format::holds_frames)) {
+        if arguments.rate.is_some() {
+            return Err("--rate is for channels, not for frames".into());
+        }
+        let (count, notes) = formats::write_frames(output, log)?;
+        print_reading(&notes);
+        eprintln!("{}: {count} frames", output.display());
+        return Ok(None);
+    }
+    let dbc = match &arguments.dbc {
+        Some(path) => std::fs::read(path).map_err(in_file(path))?,
+        None => HAPTIC_DBC.into(),
+    };
+    if arguments.rate.is_some() || target.is_some_and(|format| format != Format::Csv) {
+        return Ok(Some(formats::dbc::channels(log, &dbc, None).map_err(named)?));
+    }
+    let signals = Signals::of(log, &dbc).map_err(named)?;
+    let table = signals.table();
+    let Some(output) = &arguments.output else {
+        list(table, &signals.notes, arguments.json)?;
+        return Ok(None);
+    };
+    print_reading(&signals.notes);
+    signals.write_table(output)?;
+    eprintln!("{}: {} channels", output.display(), table.len());
+    Ok(None)
+}
+
+/// Prints the channels, and below them what was left out.
+fn list(table: Vec<Line>, notes: &Notes, json: bool) -> Result<(), BadInput> {
+    if json {
+        let channels = table.into_iter().map(|line| Channel {
+            name: line.name,
+            unit: line.unit,
+            source: line.source,
+            sample_rate_hz: line.sample_rate_hz,
+            samples: line.samples,
+        });
+        let channels = channels.collect();
+        return print_json(&Listed { channels, notes });
+    }
+    let said: String = notes.iter().map(|note| format!("\n{note}")).collect();
+    let space = if said.is_empty() { "" } else { "\n" };
+    print(&format!("{}{space}{said}", listed(table).to_text(width())))
 }
 
 /// What the file that is written does not hold as the other did, on stderr.
@@ -133,8 +162,8 @@ fn print_reading(notes: &Notes) {
     }
 }
 
-fn listed(recording: &Recording) -> Table {
-    let row = |line: haptic_log::recording::Line| {
+fn listed(table: Vec<Line>) -> Table {
+    let row = |line: Line| {
         [
             ("Channel", Cell::Text(line.name)),
             ("Unit", Cell::Text(line.unit)),
@@ -143,19 +172,5 @@ fn listed(recording: &Recording) -> Table {
             ("Values", Cell::Text(line.samples.to_string())),
         ]
     };
-    Table::of_rows("", recording.table().into_iter().map(row))
-}
-
-fn time_column(text: &str) -> Result<TimeColumn, BadInput> {
-    let column = |name: &str, scale| TimeColumn {
-        name: name.trim().into(),
-        scale,
-    };
-    let Some((name, scale)) = text.rsplit_once('*') else {
-        return Ok(column(text, None));
-    };
-    match scale.trim().parse::<f64>() {
-        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok(column(name, Some(scale))),
-        _ => Err(format!("--time {text}: the scale {scale:?} is no number above 0").into()),
-    }
+    Table::of_rows("", table.into_iter().map(row))
 }

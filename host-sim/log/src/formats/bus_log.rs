@@ -2,11 +2,12 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Read, Write};
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{Format, asc, blf};
+use super::dbc::Signals;
+use super::{Format, asc, blf, replaced};
 use crate::bus::{BusFrame, Intake, Take, interface};
 use crate::candump;
 use crate::notes::Notes;
@@ -153,39 +154,42 @@ impl BusLog {
 /// # Errors
 /// A format of channels, what the disk says; with the file. What the log says.
 pub fn write_frames(path: &Path, log: &BusLog) -> Result<(u64, Notes), RecordingError> {
-    let named = |e: std::io::Error| RecordingError(format!("{}: {e}", path.display()));
     let format = Format::from_path(path)?;
-    if !format.holds_frames() {
-        return Err(format!("{}: frames become channels by a DBC file first", path.display()).into());
-    }
-    let mut out = BufWriter::new(File::create(path).map_err(named)?);
-    let mut count = 0;
+    let (mut count, mut notes) = (0, Notes::default());
     let mut counted = |written: std::io::Result<()>| {
         count += 1;
-        written.map_err(named)
+        written.map_err(refuse)
     };
-    let notes = match format {
+    replaced(path, |out| match format {
         Format::Asc => {
             let mut writer = asc::Writer::new(out);
-            let mut notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
-            std::mem::take(&mut writer.numbers).tell(&mut notes);
-            writer.finish().map_err(named)?;
-            notes
+            notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
+            writer.numbers.tell(&mut notes);
+            writer.finish().map_err(refuse)
         }
         Format::Blf => {
-            let mut writer = blf::Writer::new(out).map_err(named)?;
-            let mut notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
-            std::mem::take(&mut writer.numbers).tell(&mut notes);
-            writer.finish().map_err(named)?;
-            notes
+            let mut writer = blf::Writer::new(out).map_err(refuse)?;
+            notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
+            writer.numbers.tell(&mut notes);
+            writer.finish().map_err(refuse)
         }
-        _ => {
+        Format::Candump => {
             let mut write =
-                |frame: &BusFrame| counted(candump::write_frame(&mut out, &interface(&frame.bus), frame));
-            let notes = log.each(&mut write)?;
-            out.flush().map_err(named)?;
-            notes
+                |frame: &BusFrame| counted(candump::write_frame(out, &interface(&frame.bus), frame));
+            notes = log.each(&mut write)?;
+            Ok(())
         }
-    };
+        _ => Err("frames become channels by a DBC file first".into()),
+    })?;
     Ok((count, notes))
+}
+
+impl Signals<'_> {
+    /// Writes all channels into the CSV file at `path`, a row an instant, without a table in memory.
+    ///
+    /// # Errors
+    /// What the disk says, with the file; what the log says.
+    pub fn write_table(&self, path: &Path) -> Result<(), RecordingError> {
+        replaced(path, |out| self.write_csv(out))
+    }
 }

@@ -50,6 +50,18 @@ impl<'a> Bytes<'a> {
     }
 }
 
+/// A float of 16 bits (IEEE 754, binary16).
+pub(super) fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 0x3FF));
+    let size = match exponent {
+        0 => fraction * 2_f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1024.0 + fraction) * 2_f64.powi(exponent - 25),
+    };
+    if bits >> 15 == 1 { -size } else { size }
+}
+
 /// What the bytes of a file may grow to: so much however small it is, and so many times its size.
 const USUAL: usize = 64 << 20;
 const TIMES: usize = 64;
@@ -97,6 +109,12 @@ impl Budget {
         };
         self.bytes -= inflated.len();
         Ok((inflated, is_whole))
+    }
+
+    #[cfg(feature = "parquet")]
+    /// So many values, or as many as may still come.
+    pub(super) fn at_most(&self, values: usize) -> usize {
+        values.min(self.values)
     }
 
     /// Takes so many values.

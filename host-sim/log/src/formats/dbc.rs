@@ -9,7 +9,7 @@ use can_dbc::{
     ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, SignalExtendedValueType, ValueType,
 };
 
-use super::{BusLog, csv};
+use super::{BusLog, Only, csv};
 use crate::bus::{self, BusFrame};
 use crate::notes::{Fate, Notes, Part};
 use crate::recording::{Group, Line, Recording, RecordingError, Series, refuse};
@@ -219,6 +219,7 @@ struct Course {
 /// A row of one message: its instant, its values, and those of the row that it replaces because it has its instant.
 struct Row<'a> {
     course: usize,
+    message: usize,
     time_s: f64,
     values: &'a [f64],
     instead_of: Option<&'a [f64]>,
@@ -286,6 +287,7 @@ fn decode(
             });
             return row(Row {
                 course: courses.len() - 1,
+                message,
                 time_s: frame.time_s,
                 values: &now,
                 instead_of: None,
@@ -312,6 +314,7 @@ fn decode(
         known.values.clone_from(&now);
         row(Row {
             course,
+            message,
             time_s: frame.time_s,
             values: &now,
             instead_of: again.then_some(&before[..]),
@@ -372,46 +375,55 @@ fn heading(dbc: &Dbc, course: &Course, signal: &Signal) -> Series {
 }
 
 /// Every message of the DBC file that is among the frames, its signals in the file's units. A signal that a frame does not
-/// carry (multiplexed, or beyond its end) is NaN there.
+/// carry (multiplexed, or beyond its end) is NaN there. Those that `only` does not want are named and not kept.
 ///
 /// # Errors
 /// A log that cannot be read; a clock that stands still; no message that is known.
-pub fn channels(log: &BusLog, dbc: &[u8]) -> Result<Recording, RecordingError> {
+pub fn channels(log: &BusLog, dbc: &[u8], only: Only<'_>) -> Result<Recording, RecordingError> {
     let (dbc, mut notes) = parse(dbc)?;
-    let mut columns: Vec<(Vec<f64>, Vec<Vec<f64>>)> = Vec::new();
+    let is_wanted = |signal: &&Signal| only.is_none_or(|only| only(&signal.name));
+    let mut columns: Vec<(Vec<f64>, Vec<(usize, Vec<f64>)>)> = Vec::new();
     let (courses, read) = decode(log, &dbc, &mut |row: Row<'_>| {
         if row.course == columns.len() {
-            columns.push((Vec::new(), vec![Vec::new(); row.values.len()]));
+            let signals = dbc.messages[row.message].signals.iter().enumerate();
+            let wanted = signals.filter(|(_, signal)| is_wanted(signal));
+            columns.push((Vec::new(), wanted.map(|(i, _)| (i, Vec::new())).collect()));
         }
         let (time_s, values) = &mut columns[row.course];
+        if values.is_empty() {
+            return Ok(());
+        }
         if row.instead_of.is_some() {
             time_s.pop();
         }
         time_s.push(row.time_s);
-        for (column, value) in values.iter_mut().zip(row.values) {
+        for (i, column) in values {
             column.truncate(time_s.len() - 1);
-            column.push(*value);
+            column.push(row.values[*i]);
         }
         Ok(())
     })?;
     notes.append(read);
+    let mut recording = Recording {
+        notes,
+        ..Recording::default()
+    };
     let mut columns: Vec<_> = courses.iter().zip(names(&courses, &dbc)).zip(columns).collect();
     columns.sort_by_key(|((course, _), _)| course.message);
-    let groups = columns.into_iter().map(|((course, name), (time_s, values))| {
-        let signals = dbc.messages[course.message].signals.iter().zip(values);
-        let channels = signals.map(|(signal, values)| Series {
+    for ((course, name), (time_s, values)) in columns {
+        let signals = &dbc.messages[course.message].signals;
+        let unread = signals.iter().filter(|signal| !is_wanted(signal));
+        recording.unread.extend(unread.map(|signal| signal.name.clone()));
+        let channels = values.into_iter().map(|(i, values)| Series {
             values,
-            ..heading(&dbc, course, signal)
+            ..heading(&dbc, course, &signals[i])
         });
-        Group {
-            name,
-            ..Group::new(time_s, channels.collect())
+        let group = Group::new(time_s, channels.collect());
+        if !group.channels.is_empty() {
+            recording.groups.push(Group { name, ..group });
         }
-    });
-    Ok(Recording {
-        groups: groups.collect(),
-        notes,
-    })
+    }
+    Ok(recording)
 }
 
 /// A channel of a log: in which group, and what there is of it.

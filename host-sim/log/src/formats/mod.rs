@@ -27,11 +27,14 @@ mod mdf;
 #[cfg(feature = "parquet")]
 mod parquet;
 
+use std::fs::File;
+use std::io::{BufWriter, Read, Write};
 use std::path::Path;
 
 pub use bus_log::{BusLog, write_frames};
 
-use crate::recording::{Group, Recording, RecordingError, Series};
+use crate::notes::Notes;
+use crate::recording::{Group, Lines, Recording, RecordingError, Series, Term, refuse};
 use crate::units;
 
 /// A format, by its extension.
@@ -125,138 +128,229 @@ impl Contents {
     }
 }
 
-/// The column that is the time where it has another name than `time_s`, and what makes it seconds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TimeColumn {
-    /// Its name.
-    pub name: String,
-    /// What its values are multiplied by; its own unit decides if none is given.
-    pub scale: Option<f64>,
+/// What is wanted of a file.
+#[derive(Clone, Copy, Default)]
+pub struct Reading<'a> {
+    /// The channel that is the time, if it is not `time_s`; its own unit decides if neither unit nor factor is given.
+    pub time: Option<&'a Term>,
+    /// Whether a channel of this name is wanted; none: all are.
+    pub only: Only<'a>,
 }
 
-/// Reads the file at `path`.
+/// Which channels are wanted.
+pub type Only<'a> = Option<&'a dyn Fn(&str) -> bool>;
+
+/// What a table holds.
+#[derive(Default)]
+struct Table {
+    columns: Vec<Series>,
+    lines: Lines,
+    unread: Vec<String>,
+    notes: Notes,
+}
+
+/// Reads the file at `path`; `through` may look at what is read, to show how far it is.
 ///
 /// # Errors
 /// What cannot be read, with the file, and the channel where one is the reason.
-pub fn read(path: &Path, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
+pub fn read(
+    path: &Path,
+    reading: Reading<'_>,
+    through: impl FnOnce(File) -> Box<dyn Read>,
+) -> Result<Contents, RecordingError> {
     let format = Format::from_path(path)?;
     let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
     if format.holds_frames() {
         return Ok(Contents::Frames(BusLog::of_file(path, format).map_err(named)?));
     }
-    let bytes = std::fs::read(path).map_err(|e| named(e.to_string().into()))?;
-    read_bytes(bytes, format, time).map_err(named)
+    let file = File::open(path).map_err(|e| named(e.to_string().into()))?;
+    read_from(through(file), format, reading).map_err(named)
+}
+
+/// Reads what a source has.
+///
+/// # Errors
+/// As [`read`], without the file's name.
+pub fn read_from(
+    mut source: impl Read,
+    format: Format,
+    reading: Reading<'_>,
+) -> Result<Contents, RecordingError> {
+    if format == Format::Csv {
+        let read = csv::read(source, reading.only).and_then(|table| with_time(table, reading.time));
+        let read = read.map(Contents::Channels).and_then(Contents::not_empty);
+        return read.map_err(RecordingError::printable);
+    }
+    let mut bytes = Vec::new();
+    source.read_to_end(&mut bytes).map_err(refuse)?;
+    read_bytes(bytes, format, reading)
 }
 
 /// Reads a file's bytes.
 ///
 /// # Errors
 /// As [`read`], without the file's name.
-pub fn read_bytes(
-    bytes: Vec<u8>,
-    format: Format,
-    time: Option<&TimeColumn>,
-) -> Result<Contents, RecordingError> {
-    contents(bytes, format, time)
+pub fn read_bytes(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Contents, RecordingError> {
+    contents(bytes, format, reading)
         .and_then(Contents::not_empty)
         .map_err(RecordingError::printable)
 }
 
-fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
+fn contents(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Contents, RecordingError> {
     let table = match format {
         Format::Candump | Format::Asc | Format::Blf => {
             return Ok(Contents::Frames(BusLog::of_bytes(bytes, format)));
         }
-        Format::Mdf4 => return Ok(Contents::Channels(mdf::read(&bytes)?.described().settled()?)),
+        Format::Mdf4 => {
+            return Ok(Contents::Channels(
+                mdf::read(&bytes, reading)?.described().settled()?,
+            ));
+        }
         Format::Mcap => {
             return Err("MCAP is written, not read: convert from what it was made of".into());
         }
-        Format::Csv => csv::read(&bytes)?,
-        Format::Mat => mat::read(&bytes)?,
+        Format::Csv => csv::read(&bytes[..], reading.only)?,
+        Format::Mat => mat::read(&bytes, reading.time)?,
         #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::read(bytes)?,
+        Format::Parquet => parquet::read(bytes, reading.only)?,
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => return Err(NO_PARQUET.to_owned().into()),
     };
-    Ok(Contents::Channels(with_time(table, time)?))
+    Ok(Contents::Channels(with_time(table, reading.time)?))
 }
 
 /// A recording of columns in memory, by their names with or without units in brackets; the time is among them.
 ///
 /// # Errors
 /// No time; columns of different lengths.
-pub fn table(
-    columns: Vec<(String, Vec<f64>)>,
-    time: Option<&TimeColumn>,
-) -> Result<Recording, RecordingError> {
+pub fn table(columns: Vec<(String, Vec<f64>)>, time: Option<&Term>) -> Result<Recording, RecordingError> {
     let (names, values): (Vec<String>, Vec<Vec<f64>>) = columns.into_iter().unzip();
     let columns = csv::headings(&names).into_iter().zip(values);
     let columns = columns.map(|(heading, values)| Series { values, ..heading });
-    with_time(columns.collect(), time)
+    let table = Table {
+        columns: columns.collect(),
+        ..Table::default()
+    };
+    with_time(table, time)
 }
 
 #[cfg(not(feature = "parquet"))]
 const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the command line host-sim does";
 
 /// Columns of a table, the time among them, as a recording.
-fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Recording, RecordingError> {
-    let (wanted, scale) = time.map_or(("time_s", None), |t| (t.name.as_str(), t.scale));
+fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, RecordingError> {
+    let usual = Term {
+        channel: "time_s".into(),
+        factor: None,
+    };
+    let time = time.unwrap_or(&usual);
+    let wanted = time.channel.as_str();
+    let columns = &mut table.columns;
     let exact = columns.iter().position(|c| c.name.eq_ignore_ascii_case(wanted));
     let place = exact.or_else(|| {
         let is_it = |c: &Series| units::bare(&c.name).eq_ignore_ascii_case(units::bare(wanted));
         columns.iter().position(is_it)
     });
+    let is_twice = |place: usize| columns[place + 1..].iter().any(|c| c.name == columns[place].name);
+    if place.is_some_and(is_twice) {
+        return Err(format!("channel {wanted} is there twice").into());
+    }
     let Some(place) = place else {
-        let names: Vec<&str> = columns.iter().take(8).map(|c| c.name.as_str()).collect();
+        let bare = units::bare(wanted);
+        if let Some(error) = table.notes.left_out(bare) {
+            return Err(error);
+        }
+        let names = columns.iter().map(|c| &c.name).chain(&table.unread);
+        let names: Vec<&str> = names.take(8).map(String::as_str).collect();
         return Err(format!(
-            "there is no channel {wanted}; if another one is the time, --map time_s=NAME says so (there are {})",
-            if names.is_empty() { "none".into() } else { names.join(", ") }
+            "there is no channel {wanted}; if another one is the time, --time NAME says so (there are {}){}",
+            if names.is_empty() {
+                "none".into()
+            } else {
+                names.join(", ")
+            },
+            table.notes.aside()
         )
         .into());
     };
-    let time = columns.remove(place);
-    let unit = match (time.unit.as_str(), units::in_brackets(&time.name)) {
-        ("", Some((_, unit))) => unit,
-        ("", None) => units::of_name(&time.name).unwrap_or("s"),
-        (unit, _) => unit,
-    };
-    let factor = scale.or_else(|| units::factor(unit, "s"));
-    let factor =
-        factor.ok_or_else(|| format!("channel {}: its unit {unit:?} is no unit of time", time.name))?;
-    if let Some(other) = columns.iter().find(|c| c.values.len() != time.values.len()) {
-        let (found, rows) = (other.values.len(), time.values.len());
-        return Err(format!(
-            "channel {}: {found} rows where {} has {rows}",
-            other.name, time.name
-        )
-        .into());
+    let mut own = columns.remove(place);
+    if own.unit.is_empty() {
+        let said = units::in_brackets(&own.name).map(|(_, unit)| unit);
+        own.unit = said
+            .or_else(|| units::of_name(&own.name))
+            .unwrap_or_default()
+            .into();
+    }
+    let factor = time.factor(&own, "s")?;
+    let rows = own.values.len();
+    if let Some(other) = columns.iter().find(|c| c.values.len() != rows) {
+        let (name, found) = (&other.name, other.values.len());
+        return Err(format!("channel {name}: {found} rows where {} has {rows}", own.name).into());
     }
     // 1.0 changes no bit.
-    let time_s = time.values.iter().map(|t| t * factor).collect();
-    Recording::of(Group::new(time_s, columns)).described().settled()
+    let time_s = own.values.into_iter().map(|t| t * factor).collect();
+    let mut group = Group::new(time_s, table.columns);
+    group.lines = table.lines;
+    Recording {
+        groups: vec![group],
+        unread: table.unread,
+        notes: table.notes,
+    }
+    .described()
+    .settled()
 }
 
-/// Writes channels into the file at `path`.
+/// Writes channels into the file at `path`: beside it first, so that a file that is there is replaced by a whole one.
 ///
 /// # Errors
 /// A format of frames, channels that it cannot hold, what the disk says; with the file.
 pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
-    let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::from_path(path)? {
-        Format::Csv => csv::write(&recording.into_one_group().map_err(named)?),
-        Format::Mat => mat::write(&recording.into_one_group().map_err(named)?),
-        Format::Mdf4 => mdf::write(&recording),
+    let format = Format::from_path(path)?;
+    replaced(path, |out| {
+        match format {
+        Format::Csv => whole(out, csv::write(&recording.into_one_group()?)?),
+        Format::Mat => whole(out, mat::write(&recording.into_one_group()?)?),
+        Format::Mdf4 => whole(out, mdf::write(&recording)?),
         #[cfg(feature = "mcap")]
-        Format::Mcap => mcap::write(&recording),
+        Format::Mcap => whole(out, mcap::write(&recording)?),
         #[cfg(not(feature = "mcap"))]
         Format::Mcap => Err("this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap".into()),
         #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::write(&recording.into_one_group().map_err(named)?),
+        Format::Parquet => whole(out, parquet::write(&recording.into_one_group()?)?),
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => Err(NO_PARQUET.to_owned().into()),
         Format::Candump | Format::Asc | Format::Blf => Err(
             "a table of channels has no frames, and a bus log nothing else; `host-sim run --bus-log` records the bus".into(),
         ),
+    }
+    })
+}
+
+fn whole(out: &mut Out, bytes: Vec<u8>) -> Result<(), RecordingError> {
+    out.write_all(&bytes).map_err(refuse)
+}
+
+/// A file under way.
+type Out = BufWriter<File>;
+
+/// Puts what `write` writes in the place of the file at `path`; where that fails, the file stays as it is. What a kill leaves
+/// beside it is in nobody's way.
+fn replaced(
+    path: &Path,
+    write: impl FnOnce(&mut Out) -> Result<(), RecordingError>,
+) -> Result<(), RecordingError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let beside = path.with_file_name(format!(".{name}.{}", std::process::id()));
+    let made = || -> Result<(), RecordingError> {
+        let mut out = BufWriter::new(File::create(&beside).map_err(refuse)?);
+        write(&mut out)?;
+        let file = out.into_inner().map_err(refuse)?;
+        file.sync_all().map_err(refuse)?;
+        std::fs::rename(&beside, path).map_err(refuse)
     };
-    std::fs::write(path, bytes.map_err(named)?).map_err(|e| named(e.to_string().into()))
+    made().map_err(|e| {
+        // If it cannot be removed either, the disk has said why.
+        let _ = std::fs::remove_file(&beside);
+        RecordingError(format!("{}: {e}", path.display()))
+    })
 }

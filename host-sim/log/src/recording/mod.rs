@@ -6,11 +6,13 @@
 
 mod grid;
 mod stamps;
+mod term;
 
 use crate::notes::Notes;
 use crate::trace::{CHANNELS, Trace};
 use crate::units;
 pub use stamps::Lines;
+pub use term::Term;
 
 /// A channel of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,6 +45,8 @@ pub struct Group {
 pub struct Recording {
     /// The groups, in the order of the file.
     pub groups: Vec<Group>,
+    /// Names of channels that nobody asked for, and that were not read.
+    pub unread: Vec<String>,
     /// What the file holds that the groups do not.
     pub notes: Notes,
 }
@@ -111,7 +115,12 @@ impl Group {
     /// Values a second, in the mean over the group's instants.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
-        rate_hz(&self.time_s)
+        let span_s = self
+            .time_s
+            .last()
+            .zip(self.time_s.first())
+            .map_or(0.0, |(b, a)| b - a);
+        rate_hz(self.time_s.len(), span_s)
     }
 
     /// The first instant that is not after the one before it.
@@ -123,10 +132,11 @@ impl Group {
     }
 }
 
-fn rate_hz(time_s: &[f64]) -> f64 {
-    match time_s {
-        [first, .., last] if last > first => (time_s.len() - 1) as f64 / (last - first),
-        _ => 0.0,
+fn rate_hz(samples: usize, span_s: f64) -> f64 {
+    if span_s > 0.0 {
+        (samples - 1) as f64 / span_s
+    } else {
+        0.0
     }
 }
 
@@ -148,7 +158,12 @@ impl Recording {
     #[must_use]
     pub fn table(&self) -> Vec<Line> {
         let line = |(group, channel): (&Group, &Series)| {
-            let (there, _) = channel.present_values(group);
+            let is_there = |k: &usize| !channel.values[*k].is_nan();
+            let mut there = (0..channel.values.len()).filter(is_there);
+            let first = there.next();
+            let ends = first.zip(there.next_back());
+            let samples = there.count() + usize::from(first.is_some()) + usize::from(ends.is_some());
+            let span_s = ends.map_or(0.0, |(first, last)| group.time_s[last] - group.time_s[first]);
             let many = self.channels().filter(|(_, c)| c.name == channel.name).count() > 1;
             Line {
                 name: if many {
@@ -158,8 +173,8 @@ impl Recording {
                 },
                 unit: channel.unit.clone(),
                 source: channel.source.clone(),
-                sample_rate_hz: rate_hz(&there),
-                samples: there.len(),
+                sample_rate_hz: rate_hz(samples, span_s),
+                samples,
             }
         };
         self.channels().map(line).collect()
@@ -185,13 +200,19 @@ impl Recording {
                 .filter(|(_, c)| units::bare(&c.name) == name)
                 .collect();
         }
+        if found.is_empty() {
+            let bare = units::bare(name);
+            found = self
+                .channels()
+                .filter(|(_, c)| c.name.eq_ignore_ascii_case(bare))
+                .collect();
+        }
         match found[..] {
             [found] => Ok(found),
-            [] => Err(match self.notes.why_left_out(name) {
-                Some(why) => format!("there is no channel {name}: it was left out ({why})"),
-                None => format!("there is no channel {name}{}", self.near(name)),
-            }
-            .into()),
+            [] => Err(self
+                .notes
+                .left_out(units::bare(name))
+                .unwrap_or_else(|| format!("there is no channel {name}{}", self.near(name)).into())),
             [(first, a), (second, b), ..] if std::ptr::eq(first, second) => Err(format!(
                 "channel {name} is there twice, as {} and as {}: say which",
                 a.name, b.name
@@ -205,16 +226,40 @@ impl Recording {
         }
     }
 
-    fn near(&self, name: &str) -> String {
+    /// Names that differ from this one in the last part, where units stand, or at least have its first part.
+    #[must_use]
+    pub fn like(&self, name: &str) -> Vec<&str> {
         let lower = name.to_lowercase();
-        let stem = lower.split(['_', '.', ' ']).next().unwrap_or(&lower);
-        let names = self.channels().map(|(_, c)| c.name.as_str());
-        let (near, all): (Vec<&str>, Vec<&str>) = names.partition(|n| n.to_lowercase().contains(stem));
-        let (said, shown) = match (near.is_empty(), all.is_empty()) {
-            (false, _) => ("near are", near),
-            (true, false) => ("there are", all),
-            (true, true) => return "; there is none at all".into(),
+        let (stem, _) = lower.rsplit_once('_').unwrap_or((&lower, ""));
+        let first = lower
+            .split(['_', '.', ' '])
+            .next()
+            .filter(|first| first.len() > 2);
+        let having = |part: &str| -> Vec<&str> {
+            let is_it = |own: &&str| own.to_lowercase().contains(part);
+            self.names().filter(is_it).collect()
         };
+        let like = having(stem);
+        match first {
+            Some(first) if like.is_empty() => having(first),
+            _ => like,
+        }
+    }
+
+    fn names(&self) -> impl Iterator<Item = &str> {
+        let read = self.channels().map(|(_, c)| c.name.as_str());
+        read.chain(self.unread.iter().map(String::as_str))
+    }
+
+    fn near(&self, name: &str) -> String {
+        let like = self.like(name);
+        let (said, shown) = match like.is_empty() {
+            false => ("near are", like),
+            true => ("there are", self.names().collect()),
+        };
+        if shown.is_empty() {
+            return "; there is none at all".into();
+        }
         let dots = if shown.len() > 8 { ", .." } else { "" };
         format!("; {said} {}{dots}", shown[..shown.len().min(8)].join(", "))
     }

@@ -29,18 +29,18 @@ impl Lines {
         let (_, more) = self.0.get(next.checked_sub(1)?)?;
         Some(row as u64 + more)
     }
-}
 
-impl Group {
     /// Where a row stands in the file: its line in a text, else its row, from 1.
     #[must_use]
     pub fn place(&self, row: usize) -> String {
-        match self.lines.of(row) {
+        match self.of(row) {
             Some(line) => format!("line {line}"),
             None => format!("row {}", row + 1),
         }
     }
+}
 
+impl Group {
     /// Leaves out rows without a stamp, and rows that are there twice.
     ///
     /// # Errors
@@ -56,13 +56,13 @@ impl Group {
         for (row, time_s) in self.time_s.iter().enumerate() {
             let before = kept.last().copied();
             if !time_s.is_finite() {
-                notes.count(Fate::LeftOut, Part::Row, "no time", self.place(row));
+                notes.count(Fate::LeftOut, Part::Row, "no time", self.lines.place(row));
             } else if before.is_some_and(|last| self.time_s[last] == *time_s && same(last, row)) {
                 notes.count(
                     Fate::Merged,
                     Part::Row,
                     "there twice, with all values",
-                    self.place(row),
+                    self.lines.place(row),
                 );
             } else {
                 kept.push(row);
@@ -97,7 +97,7 @@ impl Group {
         } else {
             "does its clock wrap, was it set back, or are two drives in one file?"
         };
-        let place = self.place(row);
+        let place = self.lines.place(row);
         format!("{place}: the time goes from {a} to {b} s, and must grow: {guess}").into()
     }
 }

@@ -14,10 +14,9 @@ use std::io::Read;
 use std::path::Path;
 
 use haptic_log::candump;
-use haptic_log::formats::{self, BusLog, Contents, Format, TimeColumn};
+use haptic_log::formats::{self, BusLog, Contents, Format};
 use haptic_log::notes::Note;
-use haptic_log::recording::{Group, Recording, RecordingError, Series};
-use haptic_log::table::TableReader;
+use haptic_log::recording::{Group, Lines, Recording, RecordingError, Series, Term};
 use haptic_log::units;
 
 use super::bus_trace;
@@ -26,15 +25,17 @@ use instants::at_the_torque;
 pub use layout::{Layout, Table};
 pub use mapping::Mapping;
 
-/// What can be mapped: the columns that a log must have, and the speed.
-const NAMES: [&str; 7] = {
+/// What can be mapped: the columns that a log must have, and the speed, in one of two units.
+const NAMES: [&str; 8] = {
     let [a, b, c, d, e, f] = COLUMNS;
-    [a, b, c, d, e, f, SPEED_COLUMN]
+    [a, b, c, d, e, f, SPEED_COLUMN, "speed_kmh"]
 };
-const UNITS: [&str; 7] = ["s", "m", "rad", "rad", "N.m", "N.m", "m/s"];
+const UNITS: [&str; 8] = ["s", "m", "rad", "rad", "N.m", "N.m", "m/s", "km/h"];
 const GUIDANCE: usize = 4;
 const DRIVER: usize = 5;
 const SPEED: usize = 6;
+/// Faster than cars are driven, m/s: the unit may be another.
+const FAST_M_PER_S: f64 = 50.0;
 
 /// Reads the log at `path`: a CSV file, a recording of the bus, or a file of another tool by its extension; `layout` says what
 /// the columns of a table are, if they are not those of a log. The sentences say what was converted or computed.
@@ -84,7 +85,9 @@ fn of_bus(
         return Ok((log, vec![note.into()]));
     }
     let dbc = bus_trace::dbc_file(how.dbc)?;
-    of_channels(&formats::dbc::channels(&log.of_bus(how.bus), &dbc)?, maps, how)
+    let only = &|name: &str| is_wanted(maps, name);
+    let recording = formats::dbc::channels(&log.of_bus(how.bus), &dbc, Some(only))?;
+    of_channels(&recording, maps, how)
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.
@@ -102,17 +105,37 @@ pub fn of_bytes(
     if let Some(layout) = layout {
         return layout.read(&bytes, format, maps, how);
     }
-    if let Some(format) = bus_format(format, &bytes) {
-        return of_bus(BusLog::of_bytes(bytes, format), maps, how);
-    }
-    // A CSV file keeps its own reader, which names lines.
-    let is_text = matches!(format, None | Some(Format::Csv | Format::Candump));
-    if maps.is_empty() && is_text && !has_units(&bytes) {
-        let log = DriveLog::read_within(&bytes[..], how.manual, how.stretches)?;
-        return Ok((log, Vec::new()));
-    }
-    let contents = formats::read_bytes(bytes, format.unwrap_or(Format::Csv), time_of(maps).as_ref());
-    match contents? {
+    let format = bus_format(format, &bytes).unwrap_or(match format {
+        None | Some(Format::Candump) => Format::Csv,
+        Some(format) => format,
+    });
+    of_contents(
+        formats::read_bytes(bytes, format, reading(maps, &|name| is_wanted(maps, name)))?,
+        maps,
+        how,
+    )
+}
+
+/// A log of a CSV file's text, of which only the columns that are needed are kept.
+pub(super) fn of_csv(
+    source: impl Read,
+    maps: &[Mapping],
+    how: &bus_trace::Recording<'_>,
+) -> Result<(DriveLog, Vec<String>), LogError> {
+    let reading = &|name: &str| is_wanted(maps, name);
+    of_contents(
+        formats::read_from(source, Format::Csv, self::reading(maps, reading))?,
+        maps,
+        how,
+    )
+}
+
+fn of_contents(
+    contents: Contents,
+    maps: &[Mapping],
+    how: &bus_trace::Recording<'_>,
+) -> Result<(DriveLog, Vec<String>), LogError> {
+    match contents {
         Contents::Frames(log) => of_bus(log, maps, how),
         Contents::Channels(recording) => of_channels(&recording, maps, how),
     }
@@ -132,7 +155,7 @@ pub fn of_table(
     let is_there = |map: &Mapping| {
         columns
             .iter()
-            .any(|(name, _)| units::bare(name) == units::bare(&map.channel))
+            .any(|(name, _)| units::bare(name) == units::bare(&map.term.channel))
     };
     if let Some(map) = maps.iter().find(|map| !is_there(map)) {
         let names: Vec<&str> = columns.iter().take(8).map(|(name, _)| name.as_str()).collect();
@@ -141,15 +164,13 @@ pub fn of_table(
         } else {
             names.join(", ")
         };
-        return refuse(format!("there is no channel {}; there are {there}", map.channel));
+        return refuse(format!(
+            "there is no channel {}; there are {there}",
+            map.term.channel
+        ));
     }
-    let asked = NAMES
-        .into_iter()
-        .chain(maps.iter().map(|map| map.channel.as_str()));
-    let asked: Vec<&str> = asked.map(units::bare).collect();
-    columns.retain(|(name, _)| asked.contains(&units::bare(name)));
-    let recording = formats::table(columns, time_of(maps).as_ref());
-    let recording = recording?;
+    columns.retain(|(name, _)| is_wanted(maps, name));
+    let recording = formats::table(columns, reading(maps, &|_| true).time)?;
     of_channels(&recording, maps, how)
 }
 
@@ -160,21 +181,22 @@ fn once(maps: &[Mapping]) -> Result<(), LogError> {
     })
 }
 
-fn time_of(maps: &[Mapping]) -> Option<TimeColumn> {
-    maps.iter().find(|map| map.column == 0).map(|map| TimeColumn {
-        name: map.channel.clone(),
-        scale: map.scale,
-    })
+/// What is to be read of a file: the time by its mapping, and the channels that are wanted.
+fn reading<'a>(maps: &'a [Mapping], only: &'a dyn Fn(&str) -> bool) -> formats::Reading<'a> {
+    formats::Reading {
+        time: maps.iter().find(|map| map.column == 0).map(|map| &map.term),
+        only: Some(only),
+    }
 }
 
-/// Whether a table has columns of a log with their units in brackets.
-fn has_units(bytes: &[u8]) -> bool {
-    let is_column = |name: &str| NAMES.iter().any(|column| column.eq_ignore_ascii_case(name));
-    let with_unit = |text: &String| units::in_brackets(text).is_some_and(|(name, _)| is_column(name));
-    let heading = bytes
-        .split(|byte| *byte == b'\n')
-        .find(|line| !line.starts_with(b"#") && !line.trim_ascii().is_empty());
-    TableReader::new(heading.unwrap_or_default()).is_ok_and(|table| table.header().iter().any(with_unit))
+/// Whether a log is made of a channel of this name.
+fn is_wanted(maps: &[Mapping], name: &str) -> bool {
+    let is_it = |wanted: &str| {
+        let same =
+            |own: &str| own.eq_ignore_ascii_case(wanted) || own.eq_ignore_ascii_case(units::bare(wanted));
+        same(name) || same(units::bare(name)) || wanted.ends_with(&format!(".{name}"))
+    };
+    NAMES.into_iter().any(is_it) || maps.iter().any(|map| is_it(&map.term.channel))
 }
 
 /// A column's channel with what makes it SI.
@@ -190,27 +212,51 @@ fn of_channels(
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     let manual = how.manual;
-    let mut notes = Vec::new();
+    let (mut notes, mut missing) = (Vec::new(), Vec::new());
     let mut columns: [Option<Column<'_>>; 6] = Default::default();
     for (i, column) in columns.iter_mut().enumerate().skip(1) {
         let map = maps.iter().find(|map| map.column == i);
-        let (group, series) = match wanted(recording, i, map) {
+        let (group, series) = match recording.find(map.map_or(NAMES[i], |map| &map.term.channel)) {
             Ok(found) => found,
             Err(_) if manual && i == GUIDANCE && map.is_none() => continue,
-            Err(error) if map.is_none() => {
-                let wanted = COLUMNS[i];
-                return refuse(format!(
-                    "{error}; --map {wanted}=CHANNEL[*SCALE] names another one"
-                ));
+            Err(_) if map.is_none() => {
+                missing.push(NAMES[i]);
+                continue;
             }
             Err(error) => return Err(error.into()),
         };
-        let scale = scale(series, i, map)?;
+        let scale = factor(series, i, map)?;
         if scale != 1.0 {
             notes.push(converted(series, i, scale));
         }
         *column = Some(Column { group, series, scale });
     }
+    if let Some(error) = missing.iter().find_map(|name| recording.notes.left_out(name)) {
+        return Err(error.into());
+    }
+    match missing[..] {
+        [] => {}
+        [name] => {
+            let error = recording
+                .find(name)
+                .map(drop)
+                .err()
+                .map_or(String::new(), |e| e.to_string());
+            return refuse(format!("{error}; --map {name}=CHANNEL names another one"));
+        }
+        _ => {
+            let with_near = |name: &&str| match recording.like(name).first() {
+                Some(near) => format!("{name} (there is {near})"),
+                None => (*name).to_owned(),
+            };
+            let names: Vec<String> = missing.iter().map(with_near).collect();
+            let names = names.join(", ");
+            return refuse(format!(
+                "there are no channels {names}; --map NAME=CHANNEL names others"
+            ));
+        }
+    }
+    let nowhere = Lines::default();
     let one = columns
         .iter()
         .flatten()
@@ -220,36 +266,22 @@ fn of_channels(
     } else {
         at_the_torque(&columns, &mut notes)?
     };
-    let mut log = DriveLog::from_rows(time_s, values, manual, how.stretches)?;
+    let lines = columns.iter().flatten().next().filter(|_| one);
+    let lines = lines.map_or(&nowhere, |column| &column.group.lines);
+    let mut log = DriveLog::from_rows(time_s, values, manual, (lines, how.stretches))?;
     log.findings.extend(recording.notes.iter().map(Note::finding));
     tell_speed(&mut log, recording, maps, &mut notes)?;
     Ok((log, notes))
 }
 
-/// The channel of a column.
-fn wanted<'a>(
-    recording: &'a Recording,
-    column: usize,
-    map: Option<&Mapping>,
-) -> Result<(&'a Group, &'a Series), RecordingError> {
-    recording.find(map.map_or(NAMES[column], |map| map.channel.as_str()))
-}
-
 /// What a channel's values are multiplied by to be a column's.
-fn scale(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, LogError> {
-    let (wanted, name) = (UNITS[column], &series.name);
-    match (map.and_then(|map| map.scale), series.unit.as_str()) {
-        (Some(scale), _) => Ok(scale),
-        (None, "") => Ok(1.0),
-        (None, unit) => units::factor(unit, wanted).ok_or_else(|| {
-            format!(
-                "channel {name}: its unit {unit:?} is not known as one of {wanted}; --map {}={name}*SCALE says how \
-                 many {wanted} it is",
-                NAMES[column]
-            )
-            .into()
-        }),
-    }
+fn factor(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, RecordingError> {
+    let own = || Term {
+        channel: series.name.clone(),
+        factor: None,
+    };
+    let term = map.map_or_else(own, |map| map.term.clone());
+    term.factor(series, UNITS[column])
 }
 
 fn converted(series: &Series, column: usize, scale: f64) -> String {
@@ -266,20 +298,42 @@ fn tell_speed(
     maps: &[Mapping],
     notes: &mut Vec<String>,
 ) -> Result<(), LogError> {
-    let map = maps.iter().find(|map| map.column == SPEED);
-    let found = wanted(recording, SPEED, map).map_err(LogError::from);
-    let found = found.and_then(|(_, series)| Ok((series, scale(series, SPEED, map)?)));
+    let mapped: Vec<&Mapping> = maps.iter().filter(|map| map.column >= SPEED).collect();
+    let (column, map) = match mapped[..] {
+        [_, _, ..] => {
+            return refuse(format!(
+                "{} and {} are mapped: one of them is wanted",
+                NAMES[6], NAMES[7]
+            ));
+        }
+        [map] => (map.column, Some(map)),
+        [] if recording.find(SPEED_COLUMN).is_ok() => (SPEED, None),
+        [] => (SPEED + 1, None),
+    };
+    let found = recording.find(map.map_or(NAMES[column], |map| &map.term.channel));
+    let found = found.and_then(|(_, series)| Ok((series, factor(series, column, map)?)));
     let (series, scale) = match found {
         Ok(found) => found,
         Err(_) if map.is_none() => return Ok(()),
-        Err(error) => return Err(error),
+        Err(error) => return Err(error.into()),
     };
     if scale != 1.0 {
-        notes.push(converted(series, SPEED, scale));
+        notes.push(converted(series, column, scale));
     }
-    let speeds: Vec<f64> = series.values.iter().map(|v| v * scale).collect();
+    let m_per_s = units::factor(UNITS[column], "m/s").unwrap_or(1.0);
+    let speeds: Vec<f64> = series.values.iter().map(|v| v * scale * m_per_s).collect();
     log.tell_speed(&speeds);
+    notes.extend(fast(log));
     Ok(())
+}
+
+/// A sentence about a speed that no car is likely to have.
+fn fast(log: &DriveLog) -> Option<String> {
+    let [_, most] = log.speeds_m_per_s.filter(|[_, most]| *most > FAST_M_PER_S)?;
+    let kmh = 3.6 * most;
+    Some(format!(
+        "The speed goes up to {most:.1} m/s, which is {kmh:.0} km/h: is it in km/h?"
+    ))
 }
 
 type Values = [Option<Vec<f64>>; 6];
