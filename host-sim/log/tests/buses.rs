@@ -349,10 +349,15 @@ fn a_cut_file_is_read_to_the_cut() {
         notes(&found)
     );
     let whole = file("channels.blf");
-    // What python-can reads of so many bytes.
-    for (length, count) in [(300, 10), (400, 21), (450, 27), (500, 30), (580, 30), (588, 31)] {
+    // At least what python-can reads of so many bytes, and nothing that is not there.
+    let (all, _) = log("x.blf", whole.clone()).frames().unwrap();
+    for (length, least) in [(300, 10), (400, 21), (450, 27), (500, 30), (580, 30), (588, 31)] {
         let (frames, told) = log("x.blf", whole[..length].to_vec()).frames().unwrap();
-        assert_eq!(frames.len(), count, "{length}");
+        assert!(
+            frames.len() >= least && frames[..] == all[..frames.len()],
+            "{length}: {}",
+            frames.len()
+        );
         assert_eq!(
             told.iter().any(|note| note.to_string().contains("cut")),
             length < 588,
