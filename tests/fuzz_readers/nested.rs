@@ -1,6 +1,6 @@
 //! What is nested deeper than a stack is high: refused or read, and the process lives.
 
-use haptic_log::formats::{Format, Reading, read_bytes};
+use haptic_log::formats::{BusLog, Format, Reading, read_bytes};
 use haptic_sim::models::road::{Course, LaneChoice};
 
 use crate::seeds;
@@ -29,7 +29,10 @@ fn a_scenario_is_nested() {
 #[test]
 fn a_dbc_file_is_nested() {
     let text = seeds::SMALL_DBC.replace("(0.001,", &"(".repeat(DEEP));
-    assert!(haptic_log::formats::dbc::channels(&seeds::frames(4), &text).is_err());
+    assert!(
+        haptic_log::formats::dbc::channels(&BusLog::of_frames(seeds::frames(4)), text.as_bytes(), None)
+            .is_err()
+    );
 }
 
 /// Lists of data blocks, each with one link, to the next list.

@@ -25,6 +25,7 @@
 //!
 //! Not here: what a record means (`haptic-analysis`), and how it is drawn (`haptic-report`).
 
+pub mod bus;
 pub mod candump;
 mod event;
 #[cfg(feature = "formats")]

@@ -36,6 +36,8 @@ pub enum Part {
     Frame,
     /// A line of a text.
     Line,
+    /// An object of a BLF file.
+    Object,
     /// A row of a table.
     Row,
     /// A time stamp.
@@ -164,6 +166,7 @@ impl Note {
             Part::Channel => "channel",
             Part::Frame => "frame",
             Part::Line => "line",
+            Part::Object => "object",
             Part::Row => "row",
             Part::Stamp => "time stamp",
             Part::Value => "value",

@@ -1,16 +1,17 @@
 //! `host-sim convert IN [OUT]`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use haptic_log::formats::{self, Contents, Format};
+use haptic_log::formats::dbc::Signals;
+use haptic_log::formats::{self, BusLog, Contents, Format};
 use haptic_log::notes::Notes;
-use haptic_log::recording::{Recording, RecordingError};
+use haptic_log::recording::{Line, Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
 use super::recording::ReadingArguments;
-use super::{BadInput, Outcome, in_file, output, print, print_json, width};
+use super::{BadInput, Outcome, in_file, output, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -61,53 +62,82 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         ));
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
-    let wants_frames = target.is_some_and(Format::holds_frames);
-    let mut recording = match arguments.reading.read(&arguments.input, wants_frames)? {
+    let mut recording = match arguments.reading.read(&arguments.input)? {
         Contents::Channels(recording) => recording,
-        Contents::Frames(frames, notes) => {
-            if arguments.rate.is_some() {
-                return Err("--rate is for channels, not for frames".into());
+        Contents::Frames(log) => {
+            let (log, bar) = progress::of_log(log);
+            let read = of_bus(arguments, &log, target);
+            bar.finish_and_clear();
+            match read? {
+                Some(recording) => recording,
+                None => return Ok(Outcome::Good),
             }
-            let output = arguments.output.as_deref().unwrap_or(Path::new(""));
-            formats::write_frames(output, &frames)?;
-            print_reading(&notes);
-            eprintln!("{}: {} frames", output.display(), frames.len());
-            return Ok(Outcome::Good);
         }
     };
-    let named = in_file::<RecordingError>(&arguments.input);
     if let Some(rate_hz) = arguments.rate {
-        let even = recording
-            .resampled(rate_hz, arguments.reading.max_gap()?)
-            .map_err(&named)?;
-        recording.groups = vec![even];
+        let even = recording.resampled(rate_hz, arguments.reading.max_gap()?);
+        recording.groups = vec![even.map_err(in_file(&arguments.input))?];
     }
-    let table = recording.table();
     let Some(output) = &arguments.output else {
-        if arguments.json {
-            let channels = table.into_iter().map(|line| Channel {
-                name: line.name,
-                unit: line.unit,
-                source: line.source,
-                sample_rate_hz: line.sample_rate_hz,
-                samples: line.samples,
-            });
-            print_json(&Listed {
-                channels: channels.collect(),
-                notes: &recording.notes,
-            })?;
-        } else {
-            let notes: String = recording.notes.iter().map(|note| format!("\n{note}")).collect();
-            let space = if notes.is_empty() { "" } else { "\n" };
-            let table = listed(&recording).to_text(width());
-            print(&format!("{}{space}{notes}", table.trim_end()))?;
-        }
+        list(recording.table(), &recording.notes, arguments.json)?;
         return Ok(Outcome::Good);
     };
+    let count = recording.table().len();
     print_reading(&recording.notes);
     formats::write(output, recording)?;
-    eprintln!("{}: {} channels", output.display(), table.len());
+    eprintln!("{}: {count} channels", output.display());
     Ok(Outcome::Good)
+}
+
+/// What a log of frames becomes, where that needs its whole table; all else is done here, frame by frame.
+fn of_bus(
+    arguments: &Arguments,
+    log: &BusLog,
+    target: Option<Format>,
+) -> Result<Option<Recording>, BadInput> {
+    let named = in_file::<RecordingError>(&arguments.input);
+    if let (Some(output), Some(true)) = (&arguments.output, target.map(Format::holds_frames)) {
+        if arguments.rate.is_some() {
+            return Err("--rate is for channels, not for frames".into());
+        }
+        let (count, notes) = formats::write_frames(output, log)?;
+        print_reading(&notes);
+        eprintln!("{}: {count} frames", output.display());
+        return Ok(None);
+    }
+    let is_whole = arguments.rate.is_some() || arguments.reading.changes();
+    if is_whole || target.is_some_and(|format| format != Format::Csv) {
+        return arguments.reading.channels(&arguments.input, log).map(Some);
+    }
+    let signals = Signals::of(log, &arguments.reading.dbc()?).map_err(named)?;
+    let table = signals.table();
+    let Some(output) = &arguments.output else {
+        list(table, &signals.notes, arguments.json)?;
+        return Ok(None);
+    };
+    print_reading(&signals.notes);
+    signals.write_table(output)?;
+    eprintln!("{}: {} channels", output.display(), table.len());
+    Ok(None)
+}
+
+/// Prints the channels, and below them what was left out.
+fn list(table: Vec<Line>, notes: &Notes, json: bool) -> Result<(), BadInput> {
+    if json {
+        let channels = table.into_iter().map(|line| Channel {
+            name: line.name,
+            unit: line.unit,
+            source: line.source,
+            sample_rate_hz: line.sample_rate_hz,
+            samples: line.samples,
+        });
+        let channels = channels.collect();
+        return print_json(&Listed { channels, notes });
+    }
+    let said: String = notes.iter().map(|note| format!("\n{note}")).collect();
+    let space = if said.is_empty() { "" } else { "\n" };
+    let table = listed(table).to_text(width());
+    print(&format!("{}{space}{said}", table.trim_end()))
 }
 
 /// What the file that is written does not hold as the other did, on stderr.
@@ -117,8 +147,8 @@ pub(super) fn print_reading(notes: &Notes) {
     }
 }
 
-fn listed(recording: &Recording) -> Table {
-    let row = |line: haptic_log::recording::Line| {
+fn listed(table: Vec<Line>) -> Table {
+    let row = |line: Line| {
         [
             ("Channel", Cell::Text(line.name)),
             ("Unit", Cell::Text(line.unit)),
@@ -127,5 +157,5 @@ fn listed(recording: &Recording) -> Table {
             ("Values", Cell::Text(line.samples.to_string())),
         ]
     };
-    Table::of_rows("", recording.table().into_iter().map(row))
+    Table::of_rows("", table.into_iter().map(row))
 }

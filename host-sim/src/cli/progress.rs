@@ -7,6 +7,7 @@ use std::path::Path;
 
 use clap::Args;
 use haptic_batch::compare::on_threads;
+use haptic_log::formats::BusLog;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::BadInput;
@@ -31,6 +32,13 @@ pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sy
     let done = work(&|| bar.inc(1));
     bar.finish_and_clear();
     done
+}
+
+/// A log whose reading moves a bar.
+pub(super) fn of_log(log: BusLog) -> (BusLog, ProgressBar) {
+    let bar = styled(log.size(), "{bar:40} {bytes}/{total_bytes} read, {elapsed}");
+    let moved = bar.clone();
+    (log.watched(move |read| moved.inc(read)), bar)
 }
 
 /// A bar of `length` steps.

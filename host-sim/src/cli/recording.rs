@@ -10,7 +10,7 @@ use haptic_analysis::identify::{
 };
 use haptic_batch::files::load_scenario;
 use haptic_batch::identify::single_track;
-use haptic_log::formats::{self, Contents, Format, Reading};
+use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
 use haptic_log::recording::{Recording, RecordingError, Term};
 use haptic_sim::input::in_range;
 
@@ -44,6 +44,9 @@ pub(super) struct ReadingArguments {
     /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
+    /// The bus of a recording of several, by its name there: an interface (can0) or the number of a channel (1)
+    #[arg(long, value_name = "NAME")]
+    bus: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -103,6 +106,7 @@ impl ReadingArguments {
         let vehicle = vehicle.map(load_scenario).transpose()?;
         let how = How {
             dbc: self.dbc.as_deref(),
+            bus: self.bus.as_deref(),
             vehicle: vehicle.as_ref().map(single_track),
             manual,
             stretches,
@@ -112,21 +116,65 @@ impl ReadingArguments {
 
     /// Whether a file is to be understood otherwise than it says itself.
     pub(super) fn is_given(&self) -> bool {
-        let one = [&self.time, &self.layout].iter().any(|option| option.is_some());
-        one || self.dbc.is_some()
-            || [&self.from, &self.to].iter().any(|s| !s.is_empty())
-            || !self.map.is_empty()
+        self.changes() || self.dbc.is_some() || self.bus.is_some()
     }
 
-    /// What a file holds, its channels named and cut as asked; of frames, if those are wanted, as they are.
-    pub(super) fn read(&self, path: &Path, wants_frames: bool) -> Result<Contents, BadInput> {
-        let named = in_file::<RecordingError>(path);
+    /// Whether channels get another name, or rows are cut.
+    pub(super) fn changes(&self) -> bool {
+        let lists = [self.map.is_empty(), self.from.is_empty(), self.to.is_empty()];
+        self.time.is_some() || self.layout.is_some() || lists.contains(&false)
+    }
+
+    /// What the frames of a recording of the bus mean.
+    pub(super) fn dbc(&self) -> Result<Vec<u8>, BadInput> {
+        match &self.dbc {
+            Some(path) => Ok(std::fs::read(path).map_err(in_file(path))?),
+            None => Ok(HAPTIC_DBC.into()),
+        }
+    }
+
+    /// What a file holds, its channels named and cut as asked; frames of the bus that is asked for.
+    pub(super) fn read(&self, path: &Path) -> Result<Contents, BadInput> {
         if let Some(layout) = self.layout()? {
             let bytes = std::fs::read(path).map_err(in_file(path))?;
             let table = layout.recording(&bytes, Format::from_path(path).ok(), &self.maps()?);
             let table = table.map_err(in_file(path))?;
-            return Ok(Contents::Channels(self.cut(table)?));
+            return Ok(Contents::Channels(table.within(&self.stretches()?)?));
         }
+        let (time, terms) = self.terms()?;
+        let reading = Reading {
+            time: time.as_ref(),
+            only: None,
+        };
+        let (bar, through) = progress::reading(path);
+        let contents = formats::read(path, reading, |file: File| -> Box<dyn Read> { through(file) });
+        bar.finish_and_clear();
+        Ok(match contents? {
+            Contents::Frames(log) => Contents::Frames(log.of_bus(self.bus.as_deref())),
+            Contents::Channels(recording) => Contents::Channels(self.named(path, recording, &terms)?),
+        })
+    }
+
+    /// What the frames of a log mean, as asked.
+    pub(super) fn channels(&self, path: &Path, log: &BusLog) -> Result<Recording, BadInput> {
+        let (_, terms) = self.terms()?;
+        let recording = formats::dbc::channels(log, &self.dbc()?, None);
+        self.named(path, recording.map_err(in_file(path))?, &terms)
+    }
+
+    fn named(
+        &self,
+        path: &Path,
+        recording: Recording,
+        terms: &[(String, Term)],
+    ) -> Result<Recording, BadInput> {
+        let named = in_file::<RecordingError>(path);
+        let recording = recording.renamed(terms).map_err(&named)?;
+        recording.within(&self.stretches()?).map_err(named)
+    }
+
+    /// The time, and the other channels that get another name.
+    fn terms(&self) -> Result<(Option<Term>, Vec<(String, Term)>), BadInput> {
         let mut terms = Vec::new();
         for map in &self.map {
             let wanted = || format!("--map {map}: NAME=CHANNEL is wanted");
@@ -142,41 +190,17 @@ impl ReadingArguments {
                 return Err("--time and --map time_s=CHANNEL: one of them is wanted".into());
             }
         }
-        let reading = Reading {
-            time: time.as_ref(),
-            only: None,
-        };
-        let (bar, through) = progress::reading(path);
-        let contents = formats::read(path, reading, |file: File| -> Box<dyn Read> { through(file) });
-        bar.finish_and_clear();
-        let recording = match contents? {
-            Contents::Frames(frames, notes) if wants_frames => return Ok(Contents::Frames(frames, notes)),
-            Contents::Channels(recording) => recording,
-            Contents::Frames(frames, notes) => {
-                let dbc = match &self.dbc {
-                    Some(path) => std::fs::read_to_string(path).map_err(in_file(path))?,
-                    None => HAPTIC_DBC.to_owned(),
-                };
-                let mut recording = formats::dbc::channels(&frames, &dbc).map_err(&named)?;
-                recording.notes.append(notes);
-                recording
-            }
-        };
-        let recording = recording.renamed(&terms).map_err(&named)?;
-        Ok(Contents::Channels(self.cut(recording)?))
+        Ok((time, terms))
     }
 
     /// The channels of a file as a CSV table.
     pub(super) fn table(&self, path: &Path) -> Result<Vec<u8>, BadInput> {
-        let Contents::Channels(recording) = self.read(path, false)? else {
-            return Err("channels are wanted, not frames".into());
+        let recording = match self.read(path)? {
+            Contents::Channels(recording) => recording,
+            Contents::Frames(log) => self.channels(path, &log)?,
         };
         print_reading(&recording.notes);
         Ok(formats::to_csv(recording)?)
-    }
-
-    fn cut(&self, recording: Recording) -> Result<Recording, BadInput> {
-        Ok(recording.within(&self.stretches()?)?)
     }
 
     /// Longest pause that is bridged, s, if it is given.

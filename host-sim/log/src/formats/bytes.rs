@@ -76,7 +76,12 @@ pub(super) struct Budget {
 
 impl Budget {
     pub(super) fn new(file: &[u8]) -> Self {
-        let more = file.len().saturating_mul(TIMES);
+        Self::of_size(file.len() as u64)
+    }
+
+    /// The budget of a file of so many bytes.
+    pub(super) fn of_size(size: u64) -> Self {
+        let more = usize::try_from(size).unwrap_or(usize::MAX).saturating_mul(TIMES);
         Self {
             bytes: USUAL.saturating_add(more),
             values: USUAL_VALUES.saturating_add(more),
@@ -92,6 +97,18 @@ impl Budget {
         })?;
         self.bytes -= inflated.len();
         Ok(inflated)
+    }
+
+    /// Undoes zlib as far as the bytes are good, and says whether all are.
+    pub(super) fn inflated_as_far(&mut self, compressed: &[u8]) -> Result<(Vec<u8>, bool), RecordingError> {
+        let inflated = miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(compressed, self.bytes);
+        let (inflated, is_whole) = match inflated {
+            Ok(whole) => (whole, true),
+            Err(e) if e.status == TINFLStatus::HasMoreOutput => return Err(too_large()),
+            Err(e) => (e.output, false),
+        };
+        self.bytes -= inflated.len();
+        Ok((inflated, is_whole))
     }
 
     #[cfg(feature = "parquet")]

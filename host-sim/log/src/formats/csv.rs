@@ -142,20 +142,7 @@ pub(super) fn headings(texts: &[String]) -> Vec<Series> {
 }
 
 pub(super) fn write(group: &Group, out: impl Write) -> Result<(), RecordingError> {
-    let names = group.channels.iter().map(|channel| {
-        let said = units::of_name(&channel.name) == Some(channel.unit.as_str());
-        if said || ["", "1"].contains(&channel.unit.as_str()) {
-            channel.name.clone()
-        } else {
-            format!("{} [{}]", channel.name, channel.unit)
-        }
-    });
-    let mut table =
-        TableWriter::new(out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)?;
-    let text = |value: f64| match value.is_nan() {
-        true => String::new(),
-        false => value.to_string(),
-    };
+    let mut table = begin(out, &group.channels)?;
     for (k, time_s) in group.time_s.iter().enumerate() {
         let values = group.channels.iter().map(|channel| channel.values[k]);
         table
@@ -163,4 +150,24 @@ pub(super) fn write(group: &Group, out: impl Write) -> Result<(), RecordingError
             .map_err(refuse)?;
     }
     table.finish().map_err(refuse)
+}
+
+/// A table with its heading: the names of the channels, with the unit in brackets where the name does not say it.
+pub(super) fn begin<W: Write>(out: W, channels: &[Series]) -> Result<TableWriter<W>, RecordingError> {
+    let names = channels.iter().map(|channel| {
+        let said = units::of_name(&channel.name) == Some(channel.unit.as_str());
+        if said || ["", "1"].contains(&channel.unit.as_str()) {
+            channel.name.clone()
+        } else {
+            format!("{} [{}]", channel.name, channel.unit)
+        }
+    });
+    TableWriter::new(out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)
+}
+
+pub(super) fn text(value: f64) -> String {
+    match value.is_nan() {
+        true => String::new(),
+        false => value.to_string(),
+    }
 }

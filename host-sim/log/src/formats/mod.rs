@@ -13,8 +13,9 @@
 //! What holds frames needs a DBC file to become channels. A file that is damaged is refused in one sentence: nothing here
 //! indexes or allocates by what a file says without a look at how much there is. `tests/fuzz_readers/` holds that.
 
-pub mod asc;
-pub mod blf;
+mod asc;
+mod blf;
+mod bus_log;
 mod bytes;
 mod calendar;
 mod csv;
@@ -30,7 +31,8 @@ use std::fs::File;
 use std::io::{BufWriter, Read, Write};
 use std::path::Path;
 
-use crate::candump::{self, CandumpFrame};
+pub use bus_log::{BusLog, write_frames};
+
 use crate::notes::Notes;
 use crate::recording::{Group, Lines, Recording, RecordingError, Series, Term, refuse};
 use crate::units;
@@ -107,28 +109,24 @@ impl Format {
 }
 
 /// What a file holds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Contents {
     /// Channels.
     Channels(Recording),
-    /// Frames of a bus, in the order of the file, and what else it holds.
-    Frames(Vec<CandumpFrame>, Notes),
+    /// Frames of a bus, which are read when they are needed.
+    Frames(BusLog),
 }
 
 impl Contents {
     /// # Errors
-    /// Neither a value nor a frame, with what there is otherwise.
+    /// No value of any channel, with what there is otherwise.
     fn not_empty(self) -> Result<Self, RecordingError> {
-        let (is_empty, what, notes) = match &self {
-            Self::Frames(frames, notes) => (frames.is_empty(), "frame", notes),
-            Self::Channels(recording) => {
-                let mut channels = recording.groups.iter().flat_map(|group| &group.channels);
-                let is_empty = channels.all(|channel| channel.values.iter().all(|value| value.is_nan()));
-                (is_empty, "channel with a number", &recording.notes)
+        if let Self::Channels(recording) = &self {
+            let mut channels = recording.groups.iter().flat_map(|group| &group.channels);
+            if channels.all(|channel| channel.values.iter().all(|value| value.is_nan())) {
+                let aside = recording.notes.aside();
+                return Err(format!("there is no channel with a number in it{aside}").into());
             }
-        };
-        if is_empty {
-            return Err(format!("there is no {what} in it{}", notes.aside()).into());
         }
         Ok(self)
     }
@@ -144,7 +142,7 @@ pub struct Reading<'a> {
 }
 
 /// Which channels are wanted.
-type Only<'a> = Option<&'a dyn Fn(&str) -> bool>;
+pub type Only<'a> = Option<&'a dyn Fn(&str) -> bool>;
 
 /// What a table holds.
 #[derive(Default)]
@@ -166,6 +164,9 @@ pub fn read(
 ) -> Result<Contents, RecordingError> {
     let format = Format::from_path(path)?;
     let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
+    if format.holds_frames() {
+        return Ok(Contents::Frames(BusLog::of_file(path, format).map_err(named)?));
+    }
     let file = File::open(path).map_err(|e| named(e.to_string().into()))?;
     read_from(through(file), format, reading).map_err(named)
 }
@@ -200,16 +201,10 @@ pub fn read_bytes(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Resul
 }
 
 fn contents(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Contents, RecordingError> {
-    let text = |bytes: Vec<u8>| {
-        String::from_utf8(bytes).map_err(|e| {
-            let place = e.utf8_error().valid_up_to();
-            RecordingError(format!("byte {place}: this is no text"))
-        })
-    };
     let table = match format {
-        Format::Candump => return Ok(Contents::Frames(candump::parse(&text(bytes)?)?, Notes::default())),
-        Format::Asc => return Ok(Contents::Frames(asc::parse(&text(bytes)?)?, Notes::default())),
-        Format::Blf => return Ok(Contents::Frames(blf::parse(&bytes)?, Notes::default())),
+        Format::Candump | Format::Asc | Format::Blf => {
+            return Ok(Contents::Frames(BusLog::of_bytes(bytes, format)));
+        }
         Format::Mdf4 => {
             return Ok(Contents::Channels(
                 mdf::read(&bytes, reading)?.described().settled()?,
@@ -373,21 +368,5 @@ fn replaced(
         // If it cannot be removed either, the disk has said why.
         let _ = std::fs::remove_file(&beside);
         RecordingError(format!("{}: {e}", path.display()))
-    })
-}
-
-/// Writes frames into the file at `path`.
-///
-/// # Errors
-/// A format of channels, what the disk says; with the file.
-pub fn write_frames(path: &Path, frames: &[CandumpFrame]) -> Result<(), RecordingError> {
-    let format = Format::from_path(path)?;
-    replaced(path, |out| match format {
-        Format::Candump => frames
-            .iter()
-            .try_for_each(|frame| candump::write_frame(out, frame).map_err(refuse)),
-        Format::Asc => whole(out, asc::write(frames)),
-        Format::Blf => whole(out, blf::write(frames)),
-        _ => Err("frames become channels by a DBC file first".into()),
     })
 }

@@ -164,8 +164,13 @@ impl Recording {
             let ends = first.zip(there.next_back());
             let samples = there.count() + usize::from(first.is_some()) + usize::from(ends.is_some());
             let span_s = ends.map_or(0.0, |(first, last)| group.time_s[last] - group.time_s[first]);
+            let many = self.channels().filter(|(_, c)| c.name == channel.name).count() > 1;
             Line {
-                name: channel.name.clone(),
+                name: if many {
+                    format!("{}.{}", group.name, channel.name)
+                } else {
+                    channel.name.clone()
+                },
                 unit: channel.unit.clone(),
                 source: channel.source.clone(),
                 sample_rate_hz: rate_hz(samples, span_s),

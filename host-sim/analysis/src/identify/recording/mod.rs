@@ -14,7 +14,7 @@ use std::io::Read;
 use std::path::Path;
 
 use haptic_log::candump;
-use haptic_log::formats::{self, Contents, Format};
+use haptic_log::formats::{self, BusLog, Contents, Format};
 use haptic_log::notes::Note;
 use haptic_log::recording::{Group, Lines, Recording, RecordingError, Series, Term};
 use haptic_log::units;
@@ -48,9 +48,46 @@ pub fn open(
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
+    let named = |e: LogError| LogError::in_file(path.display(), e);
+    let format = Format::from_path(path).ok();
+    let mut head = Vec::new();
+    let opened = std::fs::File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    opened.map_err(|e| LogError::in_file(path.display(), e))?;
+    if let Some(format) = bus_format(format, &head).filter(|_| layout.is_none()) {
+        let log = BusLog::of_file(path, format).map_err(LogError::from);
+        let read = log.and_then(|log| once(maps).and_then(|()| of_bus(log, maps, how)));
+        return read.map_err(named);
+    }
     let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
-    of_bytes(bytes, Format::from_path(path).ok(), layout, maps, how)
-        .map_err(|e| LogError::in_file(path.display(), e))
+    of_bytes(bytes, format, layout, maps, how).map_err(named)
+}
+
+/// How much of a text shows whether it is a table or a trace.
+const HEAD: u64 = 1 << 16;
+
+/// The format of frames that a file has; a text is told by its looks.
+fn bus_format(format: Option<Format>, head: &[u8]) -> Option<Format> {
+    match format {
+        None | Some(Format::Csv | Format::Candump) => {
+            candump::looks_like_one(head).then_some(Format::Candump)
+        }
+        Some(format) => format.holds_frames().then_some(format),
+    }
+}
+
+fn of_bus(
+    log: BusLog,
+    maps: &[Mapping],
+    how: &bus_trace::Recording<'_>,
+) -> Result<(DriveLog, Vec<String>), LogError> {
+    if maps.is_empty() {
+        let (log, note) = bus_trace::of_bus(log, how)?;
+        return Ok((log, vec![note.into()]));
+    }
+    let dbc = bus_trace::dbc_file(how.dbc)?;
+    let only = &|name: &str| is_wanted(maps, name);
+    let recording = formats::dbc::channels(&log.of_bus(how.bus), &dbc, Some(only))?;
+    of_channels(&recording, maps, how)
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.
@@ -68,13 +105,10 @@ pub fn of_bytes(
     if let Some(layout) = layout {
         return layout.read(&bytes, format, maps, how);
     }
-    let is_text = matches!(format, None | Some(Format::Csv | Format::Candump));
-    let is_trace = || std::str::from_utf8(&bytes).is_ok_and(candump::looks_like_one);
-    let format = match format {
-        _ if is_text && is_trace() => Format::Candump,
+    let format = bus_format(format, &bytes).unwrap_or(match format {
         None | Some(Format::Candump) => Format::Csv,
         Some(format) => format,
-    };
+    });
     of_contents(
         formats::read_bytes(bytes, format, reading(maps, &|name| is_wanted(maps, name)))?,
         maps,
@@ -101,21 +135,10 @@ fn of_contents(
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
-    let recording = match contents {
-        Contents::Frames(frames, notes) if maps.is_empty() => {
-            let (mut log, note) = bus_trace::of_frames(&frames, how)?;
-            log.findings.extend(notes.iter().map(Note::finding));
-            return Ok((log, vec![note.into()]));
-        }
-        Contents::Frames(frames, notes) => {
-            let dbc = bus_trace::dbc_text(how.dbc)?;
-            let mut recording = formats::dbc::channels(&frames, &dbc)?;
-            recording.notes.append(notes);
-            recording
-        }
-        Contents::Channels(recording) => recording,
-    };
-    of_channels(&recording, maps, how)
+    match contents {
+        Contents::Frames(log) => of_bus(log, maps, how),
+        Contents::Channels(recording) => of_channels(&recording, maps, how),
+    }
 }
 
 /// The log of a table's columns in memory, by their names with or without units in brackets. What is not asked for may have
