@@ -5,6 +5,7 @@ mod attacks;
 mod coast;
 mod column;
 mod dbc;
+mod dbc_numbers;
 mod download;
 mod e2e;
 mod ecu;

@@ -23,7 +23,7 @@ use std::sync::Once;
 
 use haptic_analysis::identify::{HAPTIC_DBC, Recording as How, of_bytes};
 use haptic_batch::sweep::Sweep;
-use haptic_log::formats::{self, Contents, Format};
+use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
 use haptic_log::recording::Recording;
 use haptic_log::trace::Trace;
 use haptic_sim::input::InputError;
@@ -115,11 +115,14 @@ fn use_channels(recording: &Recording, number: u64) {
 
 /// Reads a recording as `convert` and as `identify` do.
 fn read_recording(bytes: &[u8], number: u64, format: Format, dbc: &str) {
-    match formats::read_bytes(bytes.to_vec(), format, None) {
+    match formats::read_bytes(bytes.to_vec(), format, Reading::default()) {
         Ok(Contents::Channels(recording)) => use_channels(&recording, number),
-        Ok(Contents::Frames(frames)) => {
-            if let Ok(recording) = formats::dbc::channels(&frames, dbc) {
+        Ok(Contents::Frames(log)) => {
+            if let Ok(recording) = formats::dbc::channels(&log, dbc.as_bytes(), None) {
                 use_channels(&recording, number);
+            }
+            if let Err(error) = log.each(&mut |_| Ok(())) {
+                assert!(!error.to_string().contains('\n'), "one sentence: {error}");
             }
         }
         Err(error) => assert!(!error.to_string().contains('\n'), "one sentence: {error}"),
@@ -191,9 +194,9 @@ fn parquet() {
 
 #[test]
 fn dbc() {
-    let frames = seeds::frames(40);
+    let log = BusLog::of_frames(seeds::frames(40));
     fuzz("dbc", &seeds::dbc(), as_it_is, |bytes, number| {
-        if let Ok(recording) = formats::dbc::channels(&frames, &String::from_utf8_lossy(bytes)) {
+        if let Ok(recording) = formats::dbc::channels(&log, bytes, None) {
             use_channels(&recording, number);
         }
     });
@@ -259,12 +262,14 @@ fn the_seeds_are_good() {
         of_bytes(whole, Some(format), None, &[], &How { manual: true, ..how }).expect("a drive");
     }
     for bytes in seeds::blf_objects() {
-        let read = formats::read_bytes(seeds::blf_file(bytes), Format::Blf, None);
-        assert!(matches!(read, Ok(Contents::Frames(frames)) if !frames.is_empty()));
+        let log = BusLog::of_bytes(seeds::blf_file(bytes), Format::Blf);
+        assert!(log.frames().is_ok_and(|(frames, _)| !frames.is_empty()));
     }
     let compressed = seeds::compressed_mat(seeds::table("mat").remove(0));
     assert!(of_bytes(compressed, Some(Format::Mat), None, &[], &how).is_ok());
-    assert!(formats::dbc::channels(&seeds::frames(40), HAPTIC_DBC).is_ok());
+    assert!(
+        formats::dbc::channels(&BusLog::of_frames(seeds::frames(40)), HAPTIC_DBC.as_bytes(), None).is_ok()
+    );
     for text in seeds::opendrive() {
         let text = String::from_utf8(text).unwrap();
         let choice = LaneChoice {

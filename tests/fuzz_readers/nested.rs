@@ -1,6 +1,6 @@
 //! What is nested deeper than a stack is high: refused or read, and the process lives.
 
-use haptic_log::formats::{Format, read_bytes};
+use haptic_log::formats::{BusLog, Format, Reading, read_bytes};
 use haptic_sim::models::road::{Course, LaneChoice};
 
 use crate::seeds;
@@ -29,7 +29,10 @@ fn a_scenario_is_nested() {
 #[test]
 fn a_dbc_file_is_nested() {
     let text = seeds::SMALL_DBC.replace("(0.001,", &"(".repeat(DEEP));
-    assert!(haptic_log::formats::dbc::channels(&seeds::frames(4), &text).is_err());
+    assert!(
+        haptic_log::formats::dbc::channels(&BusLog::of_frames(seeds::frames(4)), text.as_bytes(), None)
+            .is_err()
+    );
 }
 
 /// Lists of data blocks, each with one link, to the next list.
@@ -49,7 +52,9 @@ fn the_data_of_an_mdf_file_are_nested() {
         inner = at;
     }
     file[data..data + 8].copy_from_slice(&inner.to_le_bytes());
-    let error = read_bytes(file, Format::Mdf4, None).unwrap_err().to_string();
+    let error = read_bytes(file, Format::Mdf4, Reading::default())
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("nested"), "{error}");
 }
 
@@ -69,5 +74,5 @@ fn the_schema_of_a_parquet_file_is_nested() {
     footer.extend([0x16, 0, 0x19, 0x0C, 0]);
     let size = footer.len() as u32;
     let file = [&b"PAR1"[..], &footer, &size.to_le_bytes(), b"PAR1"].concat();
-    assert!(read_bytes(file, Format::Parquet, None).is_err());
+    assert!(read_bytes(file, Format::Parquet, Reading::default()).is_err());
 }

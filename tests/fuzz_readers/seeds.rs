@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use haptic_analysis::identify::HAPTIC_DBC;
-use haptic_log::candump::CandumpFrame;
-use haptic_log::formats;
+use haptic_log::bus::BusFrame;
+use haptic_log::formats::{self, BusLog};
 use haptic_log::recording::{Group, Recording, Series};
 use haptic_log::trace::{Sample, Trace};
 use haptic_sim::models::driver::DriverParameters;
@@ -58,14 +58,7 @@ fn drive() -> Recording {
         course("driver_torque_nm", "N.m", 0.9),
         course("speed_m_per_s", "m/s", 20.0),
     ];
-    let name = String::new();
-    Recording {
-        groups: vec![Group {
-            name,
-            time_s,
-            channels,
-        }],
-    }
+    Recording::of(Group::new(time_s, channels))
 }
 
 /// What a writer leaves.
@@ -106,13 +99,15 @@ pub(crate) fn parquet() -> Vec<Vec<u8>> {
 }
 
 /// Frames of the small bus and of others.
-pub(crate) fn frames(count: u32) -> Vec<CandumpFrame> {
-    let frame = |k: u32| CandumpFrame {
+pub(crate) fn frames(count: u32) -> Vec<BusFrame> {
+    let frame = |k: u32| BusFrame {
         line: k as usize + 1,
         time_s: 1.7e9 + f64::from(k) * 0.01,
         id: [0x100, 0x110, 0x220, 0x7FF][k as usize % 4],
         extended: k % 4 == 2,
+        bus: "can0".into(),
         data: (0..8).map(|i| (k * 37 + i * 11) as u8).collect(),
+        ..BusFrame::default()
     };
     (0..count).map(frame).collect()
 }
@@ -135,18 +130,22 @@ pub(crate) fn bus(extension: &str) -> Vec<Vec<u8>> {
                 .into_iter()
                 .find(|(id, _)| *id == frame.id());
             if frame.id() <= 0x120 && every.is_none_or(|(_, every)| step % every == 0) {
-                drive.push(CandumpFrame {
+                drive.push(BusFrame {
                     line: 0,
                     time_s: 1.7e9 + f64::from(step) * 1e-3,
+                    bus: "can0".into(),
                     id: frame.id().into(),
-                    extended: false,
                     data: frame.data().to_vec(),
+                    ..BusFrame::default()
                 });
             }
         }
     }
-    let write =
-        |frames: &[CandumpFrame]| written(extension, |path| formats::write_frames(path, frames).unwrap());
+    let write = |frames: &[BusFrame]| {
+        written(extension, |path| {
+            formats::write_frames(path, &BusLog::of_frames(frames.to_vec())).unwrap();
+        })
+    };
     let mut seeds = vec![write(&frames(12)), write(&frames(60)), write(&drive)];
     if extension == "log" {
         let mut other = String::new();
@@ -182,7 +181,7 @@ fn object(kind: u32, head: &[u8], body: &[u8]) -> Vec<u8> {
 /// What stands in the containers of a BLF file.
 pub(crate) fn blf_objects() -> Vec<Vec<u8>> {
     let message = |kind: u32| {
-        move |frame: CandumpFrame| {
+        move |frame: BusFrame| {
             let ns = ((frame.time_s - 1.7e9) * 1e9) as u64;
             let head = [&2_u32.to_le_bytes()[..], &[0; 4], &ns.to_le_bytes()].concat();
             let extended = u32::from(frame.extended) << 31;
@@ -207,7 +206,9 @@ pub(crate) fn blf_objects() -> Vec<Vec<u8>> {
 
 /// A BLF file of objects: in a container, deflated or not, or as they are.
 pub(crate) fn blf_file(objects: Vec<u8>) -> Vec<u8> {
-    let mut file = written("blf", |path| formats::write_frames(path, &frames(1)).unwrap());
+    let mut file = written("blf", |path| {
+        formats::write_frames(path, &BusLog::of_frames(frames(1))).unwrap();
+    });
     file.truncate(144);
     let container = |method: u8, inside: &[u8]| {
         let head = [

@@ -7,6 +7,7 @@ use haptic_batch::compare::{Compare, CompareResults, Kinds, METRICS, on_threads}
 use haptic_sim::drivers::AnyDriver;
 use haptic_sim::kind::{Kind, Make, Parameter};
 use haptic_sim::laws::{self, Law};
+use haptic_sim::models::STEP_S;
 use haptic_sim::parts::{self, Driver};
 use haptic_sim::scenario::Scenario;
 use pyo3::prelude::*;
@@ -144,7 +145,14 @@ impl Clone for Object {
 
 impl Law for Object {
     fn ask(&mut self, view: &laws::LawView) -> f64 {
-        self.call("ask", |py| Ok(Bound::new(py, LawView::from(view))?.into_any()))
+        let torque_nm = self.call("ask", |py| Ok(Bound::new(py, LawView::from(view))?.into_any()));
+        if !torque_nm.is_finite() && !has_raised(&self.raised) {
+            let (step, at_s) = (view.step, f64::from(view.step) * STEP_S);
+            let what =
+                format!("a law answered {torque_nm} N.m at {at_s:.3} s (step {step}): a number is wanted");
+            keep(&self.raised, Python::attach(|py| errors::input(py, what)));
+        }
+        torque_nm
     }
 }
 

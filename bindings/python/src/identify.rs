@@ -41,6 +41,7 @@ pub(crate) struct How<'py> {
     maps: Vec<String>,
     layout: Option<String>,
     dbc: Option<PathBuf>,
+    bus: Option<String>,
     vehicle: Option<Bound<'py, Scenario>>,
 }
 
@@ -73,6 +74,7 @@ impl How<'_> {
         let layout = layout.map_err(|error| errors::input(py, error))?;
         let how = Recording {
             dbc: self.dbc.as_deref(),
+            bus: self.bus.as_deref(),
             vehicle: self
                 .vehicle
                 .as_ref()
@@ -82,12 +84,22 @@ impl How<'_> {
         };
         match drive {
             Drive::File(path) => {
-                open_mapped(path, layout.as_ref(), &maps, &how).map_err(|error| errors::input(py, error))
+                let opened = open_mapped(path, layout.as_ref(), &maps, &how);
+                opened.map_err(|error| errors::input(py, in_keywords(&error.to_string())))
             }
             Drive::Columns(columns) => of_table(table_of(py, columns)?, &maps, &how)
-                .map_err(|error| errors::input(py, format!("columns: {error}"))),
+                .map_err(|error| errors::input(py, format!("columns: {}", in_keywords(&error.to_string())))),
         }
     }
+}
+
+/// A sentence that names options of the command line, with the keywords of `identify` in their place.
+fn in_keywords(sentence: &str) -> String {
+    ["map", "time", "layout", "dbc", "bus", "manual"]
+        .iter()
+        .fold(sentence.to_owned(), |text, name| {
+            text.replace(&format!("--{name} "), &format!("{name} "))
+        })
 }
 
 /// Findings of an identification, for `haptic_guidance.identify`: of one drive, or of several of one driver.

@@ -207,9 +207,9 @@ def test_a_recording_of_the_bus_takes_another_vehicle_and_another_bus(tmp_path):
         (dict(map={"e_y": "t"}), 'e_y=t: "e_y" is none of time_s'),
         (dict(map={"e_y_m": "Offset"}), "there is no channel Offset"),
         (dict(map={"e_y_m": "Comment"}), "there is no channel Comment"),
-        (dict(map={"e_y_m": "t*0"}), "the scale is no number other than 0"),
-        (dict(map={"e_y_m": "t*inf"}), "the scale is no number other than 0"),
-        (dict(map={"e_y_m": "t*wide"}), "the scale is no number other than 0"),
+        (dict(map={"e_y_m": "t*0"}), "the factor "[a-z0-9]*" is no number other than 0"),
+        (dict(map={"e_y_m": "t*inf"}), "the factor "[a-z0-9]*" is no number other than 0"),
+        (dict(map={"e_y_m": "t*wide"}), "the factor "[a-z0-9]*" is no number other than 0"),
         (dict(dbc="core/haptic.dbc"), "dbc: only for a recording of the bus"),
         (dict(vehicle=hg.Scenario()), "vehicle: only for a recording of the bus"),
         (dict(layout="openlka"), "layout: only for a file"),
@@ -220,8 +220,24 @@ def test_a_mapping_that_cannot_be_is_refused(options, says):
         hg.identify(foreign(), **options)
 
 
+def test_what_was_left_out_is_told_and_the_time_has_a_name_and_a_unit(tmp_path):
+    table_ = table(LOGS / "guided-probe-clean.csv")
+    names = list(table_)
+    path = tmp_path / "drive.csv"
+    rows = [[f"{1e3 * row[0]:.6f}", *map(repr, map(float, row[1:])), ""] for row in zip(*table_.values())]
+    rows[0][-1] = "0.5"
+    rows[7][-1] = "left"
+    heading = ["t", *names[1:], "speed_kmh"]
+    path.write_text("\n".join(map(",".join, [heading, *rows])) + "\n")
+    fit = hg.identify(path, time="t [ms]")
+    assert ("1 channel (speed_kmh)", 'line 9: speed_kmh is "left", which is not a number', "left out") in fit.reading
+    assert fit["k_hg"].identified == hg.identify(LOGS / "guided-probe-clean.csv")["k_hg"].identified
+    with pytest.raises(hg.InputError, match="time: map names time_s too"):
+        hg.identify(path, time="t [ms]", map={"time_s": "t"})
+
+
 def test_a_mapping_of_a_file_is_refused_by_name():
-    for given, says in [({"e_y": "t"}, "e_y"), ({"e_y_m": "none"}, "none"), ({"e_y_m": "t*0"}, "scale")]:
+    for given, says in [({"e_y": "t"}, "e_y"), ({"e_y_m": "none"}, "none"), ({"e_y_m": "t*0"}, "factor")]:
         with pytest.raises(hg.InputError, match=says):
             hg.identify(LOGS / "guided-probe-clean.csv", map=given)
 

@@ -12,7 +12,15 @@ use haptic_sim::scenario::Scenario;
 /// An unreadable file; as [`Scenario::from_toml`] and [`load_course`].
 pub fn load_scenario(path: &Path) -> Result<Scenario, InputError> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    Scenario::from_toml(&path.display().to_string(), &read(path)?, |course, lane| {
+    let text = read(path)?;
+    // Every field has a default: whatever is empty would be a scenario.
+    if text.trim().is_empty() && path.extension().is_none_or(|extension| extension != "toml") {
+        return Err(InputError::new(
+            path.display(),
+            "it is empty; an empty scenario ends in .toml",
+        ));
+    }
+    Scenario::from_toml(&path.display().to_string(), &text, |course, lane| {
         load_lane(&folder.join(course), lane)
     })
 }

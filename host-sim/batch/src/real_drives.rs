@@ -14,9 +14,10 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use haptic_analysis::identify::{
-    DriveLog, Identification, Layout, Options, Parameter, Recording, identify_with_noise_model, open_mapped,
+    DriveLog, Identification, Layout, Mapping, Options, Parameter, Recording, identify_with_noise_model,
+    open_mapped,
 };
-use haptic_log::formats::{self, Format};
+use haptic_log::formats::{self, Format, Reading};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -108,12 +109,39 @@ pub struct Half {
     pub linear: f64,
 }
 
+/// How recordings are understood.
+#[derive(Debug, Clone)]
+pub struct Understood {
+    /// Their layout; the first built-in one that fits if there is none.
+    pub layout: Option<Layout>,
+    /// What is called otherwise than the layout says.
+    pub maps: Vec<Mapping>,
+    /// Stretches that are used, s; all of a drive if there is none.
+    pub stretches: Vec<(f64, f64)>,
+    /// Pauses up to so long are bridged, s.
+    pub bridge_s: f64,
+}
+
+impl Default for Understood {
+    fn default() -> Self {
+        Self {
+            layout: None,
+            maps: Vec::new(),
+            stretches: Vec::new(),
+            bridge_s: Options::default().bridge_s,
+        }
+    }
+}
+
 /// Reads and judges every recording below `directory`.
 ///
 /// # Errors
 /// The directory cannot be read, or holds no recording.
-pub fn real_drives(directory: &Path) -> Result<RealDrives, StudyError> {
-    let layouts = Layout::built_in()?;
+pub fn real_drives(directory: &Path, how: &Understood) -> Result<RealDrives, StudyError> {
+    let layouts = match &how.layout {
+        Some(layout) => vec![layout.clone()],
+        None => Layout::built_in()?,
+    };
     let mut files = Vec::new();
     collect(directory, &mut files).map_err(|e| format!("{}: {e}", directory.display()))?;
     files.sort();
@@ -125,7 +153,7 @@ pub fn real_drives(directory: &Path) -> Result<RealDrives, StudyError> {
     }
     let found: Vec<FileResult<'_>> = files
         .par_iter()
-        .map(|path| of_file(directory, path, &layouts))
+        .map(|path| of_file(directory, path, &layouts, how))
         .collect();
     let mut sources: Vec<Source> = Vec::new();
     for layout in found.iter().filter_map(|file| file.layout) {
@@ -166,7 +194,13 @@ fn collect(directory: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> FileResult<'a> {
+fn of_file<'a>(
+    directory: &Path,
+    path: &Path,
+    layouts: &'a [Layout],
+    understood: &Understood,
+) -> FileResult<'a> {
+    let maps = &understood.maps[..];
     let refused = |drive| FileResult {
         layout: None,
         drives: vec![drive],
@@ -189,15 +223,15 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> FileResu
         Err(error) => return refused(drive("", true, Err(error.to_string().into()))),
     };
     let format = Format::from_path(path).ok();
-    let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format)) else {
+    let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format, maps)) else {
         // A file that is broken says where; of a whole one only the time is missed.
-        let why = match formats::read_bytes(bytes, format.unwrap_or(Format::Csv), None) {
+        let why = match formats::read_bytes(bytes, format.unwrap_or(Format::Csv), Reading::default()) {
             Err(error) if !error.to_string().contains("there is no channel time_s") => error.to_string(),
             _ => "it has the channels of no layout that needs no --map".to_owned(),
         };
         return refused(drive("", true, Err(why.into())));
     };
-    let rows = Rows::read(layout, &bytes, format);
+    let rows = Rows::read(layout, &bytes, format, maps);
     let hands = rows.map(|rows| {
         (
             Felt::new(&rows),
@@ -207,14 +241,15 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> FileResu
     let judged = |by_hand| {
         let how = Recording {
             manual: by_hand,
+            stretches: &understood.stretches,
             ..Recording::default()
         };
-        let log = open_mapped(path, Some(layout), &[], &how).map_err(|e| {
+        let log = open_mapped(path, Some(layout), maps, &how).map_err(|e| {
             let why = e.to_string();
             let place = format!("{}: ", path.display());
             why.strip_prefix(&place).map_or(why.clone(), str::to_owned)
         })?;
-        judge(&log.0, by_hand)
+        judge(&log.0, by_hand, understood)
     };
     let parts = [true, false].map(|by_hand| drive(&layout.name, by_hand, judged(by_hand)));
     let [hand, shared] = &parts;
@@ -228,9 +263,11 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> FileResu
     }
 }
 
-fn judge(log: &DriveLog, by_hand: bool) -> Result<Found, StudyError> {
+fn judge(log: &DriveLog, by_hand: bool, how: &Understood) -> Result<Found, StudyError> {
     let options = Options {
         manual: by_hand,
+        stretches: how.stretches.clone(),
+        bridge_s: how.bridge_s,
         ..Options::default()
     };
     let fit = identify_with_noise_model(log, &options);

@@ -52,7 +52,7 @@ def same(ours, theirs, what):
 
 
 def units(path):
-    return {channel["name"]: channel["unit"] for channel in json.loads(host_sim("convert", path, "--json"))}
+    return {channel["name"]: channel["unit"] for channel in json.loads(host_sim("convert", path, "--json"))["channels"]}
 
 
 def written_by_us(run):

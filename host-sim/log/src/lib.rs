@@ -25,12 +25,14 @@
 //!
 //! Not here: what a record means (`haptic-analysis`), and how it is drawn (`haptic-report`).
 
+pub mod bus;
 pub mod candump;
 mod event;
 #[cfg(feature = "formats")]
 pub mod formats;
 #[cfg(feature = "parquet")]
 pub mod guard;
+pub mod notes;
 pub mod recording;
 pub mod table;
 pub mod trace;

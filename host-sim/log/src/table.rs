@@ -1,10 +1,11 @@
 //! Tables of text fields under a heading row: CSV as people and programs write it.
 //!
 //! Written: RFC 4180 with a comma, a point as decimal sign and LF. Read: the same, with semicolons or tabs where the heading
-//! has no comma, with CR LF, a byte order mark, blanks around fields, empty lines and lines that begin with `#` passed over. Every row knows the line that it
-//! stands on. Not here: what the columns mean.
+//! has no comma, or what a line `sep=;` before it says; with CR LF or CR, a byte order mark, blanks around fields; empty lines
+//! and lines that begin with `#` are passed over. A row is on the line on which it ends. Not here: what the columns mean.
 
-use std::io::{self, Cursor, Read, Write};
+use std::borrow::Cow;
+use std::io::{self, BufRead, BufReader, Read, Write};
 
 /// Why a table was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -56,59 +57,117 @@ fn hint(text: &str) -> &'static str {
 }
 
 /// A row of a table.
-#[derive(Debug, Clone)]
-pub struct Row {
+#[derive(Debug, Clone, Copy)]
+pub struct Row<'a> {
     /// The line of the file that it stands on, from 1.
     pub line: u64,
-    fields: csv::StringRecord,
+    fields: &'a csv::ByteRecord,
 }
 
-impl Row {
+impl<'a> Row<'a> {
     /// The field of a column of the heading.
     #[must_use]
-    pub fn field(&self, column: usize) -> &str {
-        &self.fields[column]
+    pub fn field(self, column: usize) -> Cow<'a, str> {
+        String::from_utf8_lossy(self.fields[column].trim_ascii())
+    }
+}
+
+/// A text whose lines end in LF, the last one too, whatever they ended in.
+struct Lf<R> {
+    source: R,
+    last: u8,
+    after_cr: bool,
+}
+
+impl<R: Read> Read for Lf<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let read = self.source.read(out)?;
+            if read == 0 {
+                let is_open = self.last != b'\n' && !out.is_empty();
+                if is_open {
+                    (self.last, out[0]) = (b'\n', b'\n');
+                }
+                return Ok(usize::from(is_open));
+            }
+            let mut kept = read;
+            if self.after_cr || out[..read].contains(&b'\r') {
+                kept = 0;
+                for place in 0..read {
+                    let byte = out[place];
+                    if !(self.after_cr && byte == b'\n') {
+                        out[kept] = if byte == b'\r' { b'\n' } else { byte };
+                        kept += 1;
+                    }
+                    self.after_cr = byte == b'\r';
+                }
+            }
+            if kept > 0 {
+                self.last = out[kept - 1];
+                return Ok(kept);
+            }
+        }
     }
 }
 
 /// A table that is being read.
-pub struct TableReader {
+pub struct TableReader<R> {
     header: Vec<String>,
     header_line: u64,
-    /// Lines of the rows: the parser counts neither skipped lines nor those that end in CR and LF.
-    lines: std::vec::IntoIter<u64>,
-    reader: csv::Reader<Cursor<String>>,
+    reader: csv::Reader<BufReader<Lf<R>>>,
+    fields: csv::ByteRecord,
 }
 
-impl TableReader {
-    /// Reads the source and its heading.
+impl<R: Read> TableReader<R> {
+    /// Reads the source's heading.
     ///
     /// # Errors
     /// What cannot be read.
-    pub fn new(mut source: impl Read) -> Result<Self, TableError> {
-        let mut bytes = Vec::new();
-        let read = source.read_to_end(&mut bytes);
-        read.map_err(|e| TableError::Unreadable(e.to_string()))?;
-        let text = String::from_utf8_lossy(&bytes);
-        let (lines, kept): (Vec<u64>, Vec<&str>) = (1..)
-            .zip(text.trim_start_matches('\u{feff}').lines())
-            .filter(|(_, line)| !line.starts_with('#') && !line.trim().is_empty())
-            .unzip();
-        let mut lines = lines.into_iter();
-        let heading = kept.first().copied().unwrap_or_default();
-        let separator = |c: &char| !heading.contains(',') && heading.contains(*c);
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter([';', '\t'].into_iter().find(separator).map_or(b',', |c| c as u8))
-            .trim(csv::Trim::All)
-            .flexible(true)
-            .from_reader(Cursor::new(kept.join("\n")));
-        let header = reader.headers();
-        let header = header.map_err(|e| TableError::Unreadable(e.to_string()))?;
+    pub fn new(source: R) -> Result<Self, TableError> {
+        let unreadable = |e: &dyn std::fmt::Display| TableError::Unreadable(e.to_string());
+        let (last, after_cr) = (b'\n', false);
+        let mut source = BufReader::new(Lf {
+            source,
+            last,
+            after_cr,
+        });
+        let (mut header_line, mut separator) = (1, None);
+        let heading = loop {
+            let mut line = Vec::new();
+            let read = source.read_until(b'\n', &mut line);
+            if read.map_err(|e| unreadable(&e))? == 0 {
+                break line;
+            }
+            if header_line == 1 && (line.starts_with(&[0xFF, 0xFE]) || line.starts_with(&[0xFE, 0xFF])) {
+                return Err(unreadable(&"this is UTF-16: save it as UTF-8"));
+            }
+            let text = line
+                .strip_prefix(b"\xEF\xBB\xBF")
+                .unwrap_or(&line)
+                .trim_ascii_end();
+            match text.strip_prefix(b"sep=") {
+                Some(&[said]) => separator = Some(said),
+                _ if text.starts_with(b"#") || text.trim_ascii().is_empty() => {}
+                _ => break text.to_vec(),
+            }
+            header_line += 1;
+        };
+        let is_there = |c: &u8| !heading.contains(&b',') && heading.contains(c);
+        let usual = [b';', b'\t'].into_iter().find(is_there).unwrap_or(b',');
+        let mut table = csv::ReaderBuilder::new();
+        table
+            .delimiter(separator.unwrap_or(usual))
+            .comment(Some(b'#'))
+            .has_headers(false)
+            .flexible(true);
+        let mut names = csv::ByteRecord::new();
+        let read = table.from_reader(&heading[..]).read_byte_record(&mut names);
+        read.map_err(|e| unreadable(&e))?;
         Ok(Self {
-            header: header.iter().map(str::to_owned).collect(),
-            header_line: lines.next().unwrap_or(1),
-            lines,
-            reader,
+            header: names.iter().map(name).collect(),
+            header_line,
+            reader: table.from_reader(source),
+            fields: csv::ByteRecord::new(),
         })
     }
 
@@ -124,23 +183,47 @@ impl TableReader {
         self.header_line
     }
 
-    /// The rows, in order; all have as many fields as the heading.
-    pub fn rows(&mut self) -> impl Iterator<Item = Result<Row, TableError>> {
+    /// The next row, with as many fields as the heading; none behind the last one.
+    ///
+    /// # Errors
+    /// What cannot be read, another number of fields.
+    pub fn next_row(&mut self) -> Result<Option<Row<'_>>, TableError> {
         let expected = self.header.len();
-        let row = move |(record, line): (Result<csv::StringRecord, csv::Error>, u64)| {
-            let unreadable = |what: String| TableError::Row { line, what };
-            let fields = record.map_err(|e| unreadable(e.to_string()))?;
-            match fields.len() {
-                found if found == expected => Ok(Row { line, fields }),
-                found => Err(TableError::Fields {
-                    line,
-                    found,
-                    expected,
-                }),
+        loop {
+            let read = self.reader.read_byte_record(&mut self.fields);
+            // Counted are ends of lines, so that this is the line behind the row.
+            let line = self.header_line + self.reader.position().line() - 1;
+            let unreadable = |e: csv::Error| TableError::Row {
+                line,
+                what: e.to_string(),
+            };
+            if !read.map_err(unreadable)? {
+                return Ok(None);
             }
-        };
-        self.reader.records().zip(self.lines.by_ref()).map(row)
+            let is_blank = self.fields.len() == 1 && self.fields[0].trim_ascii().is_empty();
+            match self.fields.len() {
+                found if found == expected && !is_blank => break,
+                _ if is_blank => {}
+                found => {
+                    return Err(TableError::Fields {
+                        line,
+                        found,
+                        expected,
+                    });
+                }
+            }
+        }
+        let line = self.header_line + self.reader.position().line() - 1;
+        let fields = &self.fields;
+        Ok(Some(Row { line, fields }))
     }
+}
+
+/// A name of the heading; what is not UTF-8 is Latin-1, as older programs write a degree sign.
+fn name(field: &[u8]) -> String {
+    let field = field.trim_ascii();
+    let latin = || field.iter().map(|byte| char::from(*byte)).collect();
+    String::from_utf8(field.to_vec()).unwrap_or_else(|_| latin())
 }
 
 /// A table that is being written.
@@ -175,7 +258,7 @@ impl<W: Write> TableWriter<W> {
 }
 
 /// What loggers write where there is no value.
-const NOTHING: [&str; 6] = ["", "-", "na", "n/a", "nan", "null"];
+const NOTHING: [&str; 7] = ["", "-", "na", "n/a", "nan", "none", "null"];
 
 /// A field as a number: NaN where it says that there is none, nothing where it is a text.
 #[must_use]
@@ -199,6 +282,37 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 mod tests {
     use super::*;
 
+    fn rows(table: &mut TableReader<&[u8]>) -> Vec<(u64, String, String)> {
+        let mut rows = Vec::new();
+        while let Some(row) = table.next_row().unwrap() {
+            rows.push((row.line, row.field(0).into(), row.field(1).into()));
+        }
+        rows
+    }
+
+    /// Python's csv reads these rows, and counts these lines, of each of the texts.
+    #[test]
+    fn lines_end_in_lf_cr_or_both_and_the_last_one_in_nothing() {
+        for text in [
+            "a,b\n1,2\n3,4",
+            "a,b\r1,2\r3,4\r",
+            "a,b\r\n1,2\r3,4\n",
+            "a,b\r1,2\r\n3,4\r\n",
+        ] {
+            let mut table = TableReader::new(text.as_bytes()).unwrap();
+            assert_eq!(table.header(), ["a", "b"], "{text:?}");
+            let expected = [(2, "1".into(), "2".into()), (3, "3".into(), "4".into())];
+            assert_eq!(rows(&mut table), expected, "{text:?}");
+        }
+        let mut table = TableReader::new(&b"sep=;\r\na;b,\xB0\r\n1;\"2\n\n3\"\r\n4;5"[..]).unwrap();
+        assert_eq!(
+            (table.header(), table.header_line()),
+            (&["a".into(), "b,\u{b0}".into()][..], 2)
+        );
+        let expected = [(5, "1".into(), "2\n\n3".into()), (6, "4".into(), "5".into())];
+        assert_eq!(rows(&mut table), expected);
+    }
+
     /// Quotes and doubled quotes are RFC 4180's own example.
     #[test]
     fn rows_know_their_lines_whatever_stands_between() {
@@ -208,15 +322,17 @@ mod tests {
             (table.header(), table.header_line()),
             (&["a".into(), "b".into()][..], 3)
         );
-        let rows: Vec<_> = table.rows().map(Result::unwrap).collect();
-        let found: Vec<_> = rows.iter().map(|r| (r.line, r.field(0), r.field(1))).collect();
-        assert_eq!(found, [(4, "1", "x \"y\""), (6, "2", "")]);
+        assert_eq!(
+            rows(&mut table),
+            [(4, "1".into(), "x \"y\"".into()), (6, "2".into(), String::new())]
+        );
     }
 
     #[test]
     fn a_row_with_another_number_of_fields_is_refused_with_its_line() {
         let mut table = TableReader::new(&b"a,b\n1,2\n\n3\n"[..]).unwrap();
-        let error = table.rows().nth(1).unwrap().unwrap_err();
+        assert!(table.next_row().is_ok());
+        let error = table.next_row().unwrap_err();
         assert_eq!(error.to_string(), "line 4: 1 fields where the header has 2");
     }
 
@@ -225,9 +341,9 @@ mod tests {
         for text in ["a;b\n1;2,5", "a\tb\n1\t2,5", "a,b\n1,\"2,5\""] {
             let mut table = TableReader::new(text.as_bytes()).unwrap();
             assert_eq!(table.header(), ["a", "b"]);
-            let row = table.rows().next().unwrap().unwrap();
-            assert_eq!((number(row.field(0)), row.field(1)), (Some(1.0), "2,5"));
-            let text = row.field(1).to_owned();
+            let row = table.next_row().unwrap().unwrap();
+            assert_eq!((number(&row.field(0)), &*row.field(1)), (Some(1.0), "2,5"));
+            let text = row.field(1).into_owned();
             let (line, column) = (row.line, "b".into());
             let says = "line 2: b is \"2,5\", which is not a number: the decimal sign is a point";
             assert_eq!(TableError::NotANumber { line, column, text }.to_string(), says);

@@ -197,18 +197,17 @@ impl Trace {
         };
         let places = CHANNELS.into_iter().map(place).collect::<Result<Vec<_>, _>>()?;
         let mut samples = Vec::new();
-        for row in table.rows() {
-            let row = row?;
+        while let Some(row) = table.next_row()? {
             let mut sample = Sample::default();
             for (channel, place) in CHANNELS.iter().zip(&places) {
-                let text = place.map_or("", |place| row.field(place));
+                let text = place.map(|place| row.field(place)).unwrap_or_default();
                 let value = if text.is_empty() {
                     f64::NAN
                 } else {
                     text.parse().map_err(|_| TableError::NotANumber {
                         line: row.line,
                         column: channel.name.into(),
-                        text: text.into(),
+                        text: text.to_string(),
                     })?
                 };
                 (channel.set)(&mut sample, value);

@@ -139,12 +139,13 @@ fn groups_that_begin_at_zero_and_at_its_negative_share_the_instant() {
             source: String::new(),
             values,
         }],
+        ..Group::default()
     };
     let groups = vec![
         group("a", vec![-0.0, 0.1], vec![1.0, 2.0]),
         group("b", vec![0.0, 0.1, 0.2], vec![3.0, 4.0, 5.0]),
     ];
-    let one = Recording { groups }.into_one_group().unwrap();
+    let one = Recording::from(groups).into_one_group().unwrap();
     assert_eq!(one.time_s, [0.0, 0.1, 0.2]);
     assert_eq!(one.channels[0].values[..2], [1.0, 2.0]);
     assert!(one.channels[0].values[2].is_nan());

@@ -4,7 +4,7 @@
 
 #![cfg(feature = "parquet")]
 
-use haptic_log::formats::{self, Contents, Format};
+use haptic_log::formats::{self, Contents, Format, Reading};
 
 /// Name, unit, and the value at a time.
 type Column = (&'static str, &'static str, fn(f64) -> f64);
@@ -14,7 +14,8 @@ fn read(name: &str) -> Result<Contents, String> {
         "{}/../../tests/data/parquet/{name}.parquet",
         env!("CARGO_MANIFEST_DIR")
     );
-    formats::read_bytes(std::fs::read(path).unwrap(), Format::Parquet, None).map_err(|e| e.to_string())
+    formats::read_bytes(std::fs::read(path).unwrap(), Format::Parquet, Reading::default())
+        .map_err(|e| e.to_string())
 }
 
 #[test]

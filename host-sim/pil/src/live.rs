@@ -25,6 +25,8 @@ use super::PilError;
 use super::parameters::Product;
 use super::port::Port;
 
+pub use super::link::Unread;
+
 /// Torque frames come every millisecond; without one for so long the ECU is silent.
 const SILENT_AFTER_S: f64 = 0.1;
 
@@ -107,6 +109,11 @@ impl View {
     #[must_use]
     pub const fn counts(&self) -> &Counts {
         &self.counts
+    }
+
+    /// Counts a frame that is none of this bus: of 29 bits, or of CAN FD.
+    pub const fn take_foreign(&mut self) {
+        self.counts.foreign += 1;
     }
 
     /// Takes a frame; says what changed with it.
@@ -296,6 +303,12 @@ impl Listener {
     #[must_use]
     pub fn after(product: Product) -> Self {
         Self { port: product.port }
+    }
+
+    /// What the adapter wrote beside frames of this bus.
+    #[must_use]
+    pub fn unread(&self) -> Unread {
+        self.port.unread()
     }
 
     /// The next frame; `None` when none came for a tenth of a second.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use haptic_core::bus::Frame;
 
 use super::adapter::{self, Adapter};
-use super::link::{self, Decoder};
+use super::link::{self, Decoder, Unread};
 use super::responses::pump;
 use super::{Channel, PilError};
 
@@ -52,6 +52,11 @@ impl Port {
             .flat_map(|frame| link::encode(self.channel, frame))
             .collect();
         self.write(&bytes)
+    }
+
+    /// What the adapter wrote beside frames of this bus.
+    pub(super) fn unread(&self) -> Unread {
+        self.decoder.unread()
     }
 
     /// The next frame; None when none came for [`REOPEN`].

@@ -41,9 +41,36 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Inpu
             .replace("expected path string", "expected a string");
         match other_kind::<T>(text).or_else(|| old_name(text, fields_of)) {
             Some(hint) => InputError::new(name, hint),
-            None => InputError::new(name, message),
+            None => InputError::new(name, with_near(message)),
         }
     })
+}
+
+/// How alike two names are, 0 to 1, that one of them may be the other mistyped.
+const ALIKE: f64 = 0.75;
+
+/// Behind a name that is none of those that are known: `; did you mean NAME?` if one is like it, else nothing.
+#[must_use]
+pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let lower = name.to_lowercase();
+    let alike = known
+        .into_iter()
+        .map(|known| (known, strsim::jaro_winkler(&lower, known)));
+    let best = alike.max_by(|a, b| a.1.total_cmp(&b.1));
+    match best.filter(|(_, alike)| *alike >= ALIKE) {
+        Some((near, _)) => format!("; did you mean {near}?"),
+        None => String::new(),
+    }
+}
+
+/// A message of the parser, with the name that is meant behind the list of those that are known.
+fn with_near(message: String) -> String {
+    let near = ["unknown field `", "unknown variant `"].iter().find_map(|begin| {
+        let (name, rest) = message.split_once(begin)?.1.split_once('`')?;
+        let near = did_you_mean(name, rest.split('`').skip(1).step_by(2));
+        (!near.is_empty()).then_some(near)
+    });
+    message.trim_end().to_owned() + &near.unwrap_or_default()
 }
 
 /// A field that files of one kind alone have, and what those files are for.

@@ -3,28 +3,26 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_analysis::identify::HAPTIC_DBC;
-use haptic_log::formats::{self, Contents, Format, TimeColumn};
-use haptic_log::recording::{Recording, RecordingError};
+use haptic_log::formats::dbc::Signals;
+use haptic_log::formats::{self, BusLog, Contents, Format};
+use haptic_log::notes::Notes;
+use haptic_log::recording::{Line, Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
-use super::{BadInput, Outcome, in_file, output, print, print_json, width};
+use super::recording::ReadingArguments;
+use super::{BadInput, Outcome, in_file, output, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Recording to read; its extension says the format: .csv, .parquet, .mat, .mf4, .log (candump), .asc, .blf
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// File to write, in the format of its extension: one of those, or .mcap. Without it the channels are listed
+    /// File to write, in the format of its extension, one of those. Without it the channels are listed
     #[arg(value_name = "OUT")]
     output: Option<PathBuf>,
-    /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
-    #[arg(long, value_name = "FILE")]
-    dbc: Option<PathBuf>,
-    /// The channel that is the time, if it is not time_s
-    #[arg(long, value_name = "CHANNEL[*SCALE]")]
-    time: Option<String>,
+    #[command(flatten)]
+    reading: ReadingArguments,
     /// Put all channels on an even grid of so many rows a second: whole numbers as held, others on the line between
     /// neighbours. Without it every instant of every channel is a row
     #[arg(long, value_name = "HZ")]
@@ -32,6 +30,14 @@ pub(super) struct Arguments {
     /// Print the channels as JSON instead of a table
     #[arg(long, conflicts_with = "output")]
     json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Listed<'a> {
+    channels: Vec<Channel>,
+    /// What was left out, merged, cut, mended, guessed or converted.
+    notes: &'a Notes,
 }
 
 #[derive(Serialize)]
@@ -44,7 +50,6 @@ struct Channel {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let time = arguments.time.as_deref().map(time_column).transpose()?;
     if let Some(rate_hz) = arguments.rate.filter(|rate| !(0.1..=1e5).contains(rate)) {
         return Err(format!("--rate {rate_hz}: 0.1 to 100000 Hz is wanted").into());
     }
@@ -57,56 +62,93 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         ));
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
-    let contents = formats::read(&arguments.input, time.as_ref())?;
-    if let (Contents::Frames(frames), Some(output), Some(format)) = (&contents, &arguments.output, target)
-        && format.holds_frames()
-    {
-        if arguments.rate.is_some() {
-            return Err("--rate is for channels, not for frames".into());
-        }
-        formats::write_frames(output, frames)?;
-        eprintln!("{}: {} frames", output.display(), frames.len());
-        return Ok(Outcome::Good);
-    }
-    let named = in_file::<RecordingError>(&arguments.input);
-    let mut recording = match contents {
+    let mut recording = match arguments.reading.read(&arguments.input)? {
         Contents::Channels(recording) => recording,
-        Contents::Frames(frames) => {
-            let dbc = match &arguments.dbc {
-                Some(path) => std::fs::read_to_string(path).map_err(in_file(path))?,
-                None => HAPTIC_DBC.to_owned(),
-            };
-            formats::dbc::channels(&frames, &dbc).map_err(&named)?
+        Contents::Frames(log) => {
+            let (log, bar) = progress::of_log(log);
+            let read = of_bus(arguments, &log, target);
+            bar.finish_and_clear();
+            match read? {
+                Some(recording) => recording,
+                None => return Ok(Outcome::Good),
+            }
         }
     };
     if let Some(rate_hz) = arguments.rate {
-        recording = Recording {
-            groups: vec![recording.resampled(rate_hz).map_err(&named)?],
-        };
+        let even = recording.resampled(rate_hz, arguments.reading.max_gap()?);
+        recording.groups = vec![even.map_err(in_file(&arguments.input))?];
     }
-    let table = recording.table();
     let Some(output) = &arguments.output else {
-        if arguments.json {
-            let channels = table.into_iter().map(|line| Channel {
-                name: line.name,
-                unit: line.unit,
-                source: line.source,
-                sample_rate_hz: line.sample_rate_hz,
-                samples: line.samples,
-            });
-            print_json(&channels.collect::<Vec<_>>())?;
-        } else {
-            print(&listed(&recording).to_text(width()))?;
-        }
+        list(recording.table(), &recording.notes, arguments.json)?;
         return Ok(Outcome::Good);
     };
+    let count = recording.table().len();
+    print_reading(&recording.notes);
     formats::write(output, recording)?;
-    eprintln!("{}: {} channels", output.display(), table.len());
+    eprintln!("{}: {count} channels", output.display());
     Ok(Outcome::Good)
 }
 
-fn listed(recording: &Recording) -> Table {
-    let row = |line: haptic_log::recording::Line| {
+/// What a log of frames becomes, where that needs its whole table; all else is done here, frame by frame.
+fn of_bus(
+    arguments: &Arguments,
+    log: &BusLog,
+    target: Option<Format>,
+) -> Result<Option<Recording>, BadInput> {
+    let named = in_file::<RecordingError>(&arguments.input);
+    if let (Some(output), Some(true)) = (&arguments.output, target.map(Format::holds_frames)) {
+        if arguments.rate.is_some() {
+            return Err("--rate is for channels, not for frames".into());
+        }
+        let (count, notes) = formats::write_frames(output, log)?;
+        print_reading(&notes);
+        eprintln!("{}: {count} frames", output.display());
+        return Ok(None);
+    }
+    let is_whole = arguments.rate.is_some() || arguments.reading.changes();
+    if is_whole || target.is_some_and(|format| format != Format::Csv) {
+        return arguments.reading.channels(&arguments.input, log).map(Some);
+    }
+    let signals = Signals::of(log, &arguments.reading.dbc()?).map_err(named)?;
+    let table = signals.table();
+    let Some(output) = &arguments.output else {
+        list(table, &signals.notes, arguments.json)?;
+        return Ok(None);
+    };
+    print_reading(&signals.notes);
+    signals.write_table(output)?;
+    eprintln!("{}: {} channels", output.display(), table.len());
+    Ok(None)
+}
+
+/// Prints the channels, and below them what was left out.
+fn list(table: Vec<Line>, notes: &Notes, json: bool) -> Result<(), BadInput> {
+    if json {
+        let channels = table.into_iter().map(|line| Channel {
+            name: line.name,
+            unit: line.unit,
+            source: line.source,
+            sample_rate_hz: line.sample_rate_hz,
+            samples: line.samples,
+        });
+        let channels = channels.collect();
+        return print_json(&Listed { channels, notes });
+    }
+    let said: String = notes.iter().map(|note| format!("\n{note}")).collect();
+    let space = if said.is_empty() { "" } else { "\n" };
+    let table = listed(table).to_text(width());
+    print(&format!("{}{space}{said}", table.trim_end()))
+}
+
+/// What the file that is written does not hold as the other did, on stderr.
+pub(super) fn print_reading(notes: &Notes) {
+    for note in notes.iter() {
+        eprintln!("note: {note}");
+    }
+}
+
+fn listed(table: Vec<Line>) -> Table {
+    let row = |line: Line| {
         [
             ("Channel", Cell::Text(line.name)),
             ("Unit", Cell::Text(line.unit)),
@@ -115,19 +157,5 @@ fn listed(recording: &Recording) -> Table {
             ("Values", Cell::Text(line.samples.to_string())),
         ]
     };
-    Table::of_rows("", recording.table().into_iter().map(row))
-}
-
-fn time_column(text: &str) -> Result<TimeColumn, BadInput> {
-    let column = |name: &str, scale| TimeColumn {
-        name: name.trim().into(),
-        scale,
-    };
-    let Some((name, scale)) = text.rsplit_once('*') else {
-        return Ok(column(text, None));
-    };
-    match scale.trim().parse::<f64>() {
-        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok(column(name, Some(scale))),
-        _ => Err(format!("--time {text}: the scale {scale:?} is no number above 0").into()),
-    }
+    Table::of_rows("", table.into_iter().map(row))
 }

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_analysis::identify::{Options, Recording, open_mapped};
+use haptic_analysis::identify::Options;
 use haptic_batch::identify::compare_drivers;
 use haptic_report::studies::drivers::report;
 
+use super::recording::ReadingArguments;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, progress};
 
@@ -28,6 +29,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
@@ -36,14 +39,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     for what in &arguments.estimate {
         options.estimate(what)?;
     }
+    arguments.reading.choose(&mut options)?;
     options.check()?;
     let mut logs = Vec::new();
     for path in &arguments.logs {
-        let how = Recording {
-            manual: arguments.manual,
-            ..Recording::default()
-        };
-        let (log, _) = open_mapped(path, None, &[], &how)?;
+        let opened = arguments
+            .reading
+            .open(path, arguments.manual, &options.stretches, None);
+        let (log, notes) = opened?;
+        for note in notes {
+            eprintln!("note: {}: {note}", path.display());
+        }
         logs.push((path.display().to_string(), log));
     }
     let output = arguments.results.begin("drivers")?;

@@ -8,6 +8,7 @@ use haptic_campaign::{World, document, target};
 use haptic_core::controller::params::LAWS;
 use haptic_report::document::write_bytes;
 use haptic_report::studies::faults::{report, report_of_run};
+use haptic_sim::input::did_you_mean;
 use haptic_sim::worlds::WORLDS;
 
 use super::results::ResultArguments;
@@ -106,7 +107,10 @@ fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, Ba
     let found = |name: &String| {
         let refused = |why: &str| Err(BadInput(format!("--rows: {why}")));
         match table::rows().find(|row| row.name == name) {
-            None => refused(&format!("there is no fault {name}; --list shows them all")),
+            None => {
+                let near = did_you_mean(name, table::rows().map(|row| row.name));
+                refused(&format!("there is no fault {name}{near}; --list shows them all"))
+            }
             Some(row) if row.place == Place::Target => refused(&format!(
                 "{name} breaks the image and not the controller: cargo test -p haptic-guidance resets::"
             )),

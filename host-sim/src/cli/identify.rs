@@ -40,16 +40,6 @@ pub(super) struct Arguments {
     /// t_nms=0.06..0.15; may be repeated
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
-    /// Use the log from this time on, s; may be repeated with --to for several stretches
-    #[arg(long, value_name = "S")]
-    from: Vec<f64>,
-    /// Use the log up to this time, s
-    #[arg(long, value_name = "S")]
-    to: Vec<f64>,
-    /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
-    /// ones; 0 cuts at each
-    #[arg(long, value_name = "S", default_value_t = 0.3)]
-    max_gap: f64,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
     no_lane_smoothing: bool,
@@ -76,11 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     for what in &arguments.estimate {
         options.estimate(what)?;
     }
-    options.between(&arguments.from, &arguments.to)?;
+    arguments.recording.reading.choose(&mut options)?;
     options.lane_noise = !arguments.no_lane_smoothing;
     options.leave_out = !arguments.no_preprocessing;
-    in_range("--max-gap", arguments.max_gap, 0.0..=1.0, "s")?;
-    options.bridge_s = arguments.max_gap;
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,
@@ -89,6 +77,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let course = arguments.course.open()?;
     let output = arguments.results.begin("identify")?;
     let (log, converted) = arguments.recording.open(arguments.manual, &options.stretches)?;
+    if log.approximate_points {
+        eprintln!(
+            "note: e_y and e_theta are made of offset and curvature of the lane, which is too rough for the driver's gains: k_hg alone \
+             can be identified{}",
+            if arguments.manual {
+                ", and not by hand: this fit will have no verdict"
+            } else {
+                ""
+            }
+        );
+    }
     let name = arguments.recording.log.display().to_string();
     let mut drive = if arguments.pieces {
         if method == Method::Paper {

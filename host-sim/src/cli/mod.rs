@@ -44,6 +44,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use haptic_sim::input::did_you_mean;
 use serde::Serialize;
 
 /// Closed-loop workbench for the haptic-guidance steering controller
@@ -58,19 +59,25 @@ struct Cli {
 }
 
 const AFTER_HELP: &str = "\
-`host-sim` alone is `host-sim evaluate`. `host-sim COMMAND --help` explains a command and its options.
+`host-sim` alone is `host-sim evaluate`. `host-sim COMMAND --help` explains a
+command and its options.
 
-New here? The tutorial is docs/tutorials/first-evaluation.md; docs/glossary.md explains words and symbols.
+New here? The tutorial is docs/tutorials/first-evaluation.md;
+docs/glossary.md explains words and symbols.
 
-Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage, or a program that is not \
-installed.";
+Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or
+usage, or a program that is not installed.";
 
 /// The first paragraph of each is its line in the program's `--help`, which `names` groups.
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Three drivers, four conditions, with and without failure of the guidance
+    /// Three drivers, four conditions, with and without a failure
+    ///
+    /// What fails is the guidance.
     Evaluate(evaluate::Arguments),
-    /// The 14 participants as drivers with a known truth: driven, identified, driven again
+    /// The 14 participants as known drivers: driven, identified
+    ///
+    /// The identified drivers drive again.
     Experiment(experiment::Arguments),
     /// One scenario from a TOML file
     Run(run::Arguments),
@@ -78,51 +85,75 @@ enum Command {
     ///
     /// Fields vary by lists, ranges and distributions; threads and shards share the drives.
     Sweep(sweep::Arguments),
-    /// Every law against every driver, each law tuned first: roads, speeds, seeds, failures
+    /// Every law against every driver, each law tuned first
+    ///
+    /// On roads, at speeds, with seeds and failures.
     #[command(mut_arg("file", |file| file.help(compare::FILE)))]
     Compare(results::StudyFile),
-    /// Gains of the guidance for a population of drivers, judged on held-out drives
+    /// Gains of the guidance for a population of drivers
+    ///
+    /// They are judged on held-out drives.
     DesignGuidance(design_guidance::Arguments),
-    /// A law that adapts to a driver who adapts to it: small gain, equilibria, swings
+    /// A law that adapts to a driver who adapts to it
+    ///
+    /// Small gain, equilibria, swings.
     #[command(mut_arg("file", |file| file.help(adaptation::FILE)))]
     Adaptation(results::StudyFile),
-    /// A road from a file: its lane, length and picture, its centre every metre
+    /// A road from a file: its lane, length, picture and centre
     Course(course::Arguments),
-    /// A map over speed and delay: where a driver keeps the lane, alone and guided
+    /// A map over speed and delay: where a driver keeps the lane
+    ///
+    /// Alone, and guided.
     Stability(stability::Arguments),
     /// The lab in the browser: sliders, and a road to drive yourself
     Lab(lab::Arguments),
-    /// A driver's parameters from a recorded drive, with their uncertainty
+    /// A driver's parameters from a recorded drive
+    ///
+    /// With their uncertainty.
     Identify(identify::Arguments),
-    /// Several drivers beside each other: what differs between two, what a group is like
+    /// Several drivers beside each other
+    ///
+    /// What differs between two, what a group is like.
     Drivers(drivers::Arguments),
     /// Recordings of real people: read or refused, half against half
     ///
     /// A driver that is fitted to one half of each drive predicts the other.
     RealDrives(real_drives::Arguments),
-    /// Which experiment tells a driver's parameters to a given error: probe, course, length
+    /// Which experiment tells a driver's parameters well enough
+    ///
+    /// Probe, course and length, for a given error.
     Design(design::Arguments),
     /// Participants and conditions from one file, in a balanced order
     ///
     /// Each session leaves a recording that is never overwritten; the metrics come by condition.
     Study(study::Arguments),
-    /// How right the estimates of `identify` are, on drivers with a known truth
+    /// How right the estimates of `identify` are
+    ///
+    /// On drivers with a known truth.
     Validate(validate::Arguments),
     /// A recording in another format, or the list of its channels
     ///
-    /// CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF.
+    /// CSV, Parquet, MAT, MDF4, candump, ASC, BLF.
     Convert(convert::Arguments),
-    /// Every fault by name into the closed loop, every rule checked in every cycle
+    /// Every fault by name, every rule checked in every cycle
+    ///
+    /// In the closed loop.
     Faults(faults::Arguments),
     /// How often guidance leaves for nothing on real roads, by cause
     ///
     /// Many cars drive for hours.
     Availability(availability::Arguments),
-    /// What a lost input costs with a handover, and without: every instant of bends
+    /// What a lost input costs, with a handover and without
+    ///
+    /// At every instant of bends, at 40 to 130 km/h.
     Handover(handover::Arguments),
-    /// How well the ECU estimates while it drives how much a driver relies on it (K_hg)
+    /// How well the ECU estimates K_hg while it drives
+    ///
+    /// K_hg says how much a driver relies on it.
     Reliance(reliance::Arguments),
-    /// The ECU itself, in QEMU or on a board, and its bus: run, pil, live, parameters, bus
+    /// The ECU itself and its bus: run, pil, live, parameters, bus
+    ///
+    /// In QEMU or on a board.
     #[command(subcommand)]
     Ecu(ecu::Command),
 }
@@ -222,9 +253,10 @@ fn chosen<T>(
 ) -> Result<Vec<&'static T>, BadInput> {
     let known: Vec<&str> = all.iter().map(name_of).collect();
     if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
+        let near = did_you_mean(name, known.iter().copied());
         let known = known.join(", ");
         return Err(BadInput(format!(
-            "{option}: there is no {name}; there are {known}"
+            "{option}: there is no {name}{near}; there are {known}"
         )));
     }
     let wanted = |one: &&'static T| names.is_empty() || names.iter().any(|name| name == name_of(one));

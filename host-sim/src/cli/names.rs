@@ -50,7 +50,7 @@ pub(super) fn grouped(program: clap::Command) -> clap::Command {
         let _ = writeln!(help, "\n{header}{title}:{header:#}");
         for command in names.split(' ').filter_map(|name| program.find_subcommand(name)) {
             let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-            let _ = writeln!(help, "  {literal}{:<13} {literal:#}{about}", command.get_name());
+            let _ = writeln!(help, "  {literal}{:<15} {literal:#}{about}", command.get_name());
         }
     }
     let _ = write!(help, "\n{header}Options:{header:#}\n{{options}}{{after-help}}");
@@ -127,12 +127,12 @@ mod tests {
         );
     }
 
-    /// As a terminal of 100 columns shows it: these lines are not wrapped.
+    /// As a terminal of 80 columns shows it: these lines are not wrapped.
     #[test]
     fn a_line_of_the_list_fits() {
         let help = grouped(Cli::command()).render_help().to_string();
         for line in help.lines() {
-            assert!(line.chars().count() <= 100, "{line}");
+            assert!(line.chars().count() <= 80, "{line}");
         }
     }
 }

@@ -1,8 +1,13 @@
 //! How a command works through its drives: on how many threads, and under a progress bar on stderr; no bar where stderr is no
 //! terminal.
 
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
 use clap::Args;
 use haptic_batch::compare::on_threads;
+use haptic_log::formats::BusLog;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::BadInput;
@@ -29,6 +34,13 @@ pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sy
     done
 }
 
+/// A log whose reading moves a bar.
+pub(super) fn of_log(log: BusLog) -> (BusLog, ProgressBar) {
+    let bar = styled(log.size(), "{bar:40} {bytes}/{total_bytes} read, {elapsed}");
+    let moved = bar.clone();
+    (log.watched(move |read| moved.inc(read)), bar)
+}
+
 /// A bar of `length` steps.
 pub(super) fn bar(length: u64, unit: &str) -> ProgressBar {
     styled(length, &format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{elapsed}}"))
@@ -39,4 +51,12 @@ pub(super) fn styled(length: u64, template: &str) -> ProgressBar {
     // A template that does not parse would only cost the bar its looks.
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length).with_style(style)
+}
+
+/// A bar over the bytes of a file, and what shows there how far its reader is.
+pub(super) fn reading(path: &Path) -> (ProgressBar, impl FnOnce(File) -> Box<dyn Read> + use<>) {
+    let size = std::fs::metadata(path).map_or(0, |known| known.len());
+    let bar = styled(size, "{bar:40} {bytes}/{total_bytes} read, {elapsed}");
+    let own = bar.clone();
+    (bar, move |file| Box::new(own.wrap_read(file)))
 }

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::real_drives::real_drives;
+use haptic_analysis::identify::Options;
+use haptic_batch::real_drives::{Understood, real_drives};
 use haptic_report::studies::real_drives::report;
 
+use super::recording::ReadingArguments;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome};
 
@@ -15,11 +17,21 @@ pub(super) struct Arguments {
     #[arg(value_name = "DIR")]
     directory: PathBuf,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("real-drives")?;
-    let found = real_drives(&arguments.directory)?;
+    let mut options = Options::default();
+    arguments.reading.choose(&mut options)?;
+    let how = Understood {
+        layout: arguments.reading.layout()?,
+        maps: arguments.reading.maps()?,
+        stretches: options.stretches,
+        bridge_s: options.bridge_s,
+    };
+    let found = real_drives(&arguments.directory, &how)?;
     output.show(&report(&found), &found, true)
 }

@@ -30,11 +30,19 @@ pub(super) struct Arguments {
     results: ResultArguments,
 }
 
+/// Faster than cars are driven, m/s.
+const FAST_M_PER_S: f64 = 50.0;
+
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let mut scenario = haptic_batch::files::load_scenario(&arguments.scenario)?;
     match arguments.course.open()? {
         Some(course) => scenario = scenario.to_builder().course(course).build()?,
         None => print_notes(scenario.course().notes()),
+    }
+    let fastest = scenario.speed().fastest_m_per_s();
+    if fastest > FAST_M_PER_S {
+        let kmh = 3.6 * fastest;
+        eprintln!("note: the speed goes up to {fastest:.1} m/s, which is {kmh:.0} km/h: is it in km/h?");
     }
     let output = arguments.results.begin("run")?;
     let single = simulate(scenario, arguments.bus_log)

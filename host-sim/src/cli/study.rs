@@ -1,11 +1,12 @@
 //! `host-sim study FILE.toml`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use haptic_batch::study::Study;
 use haptic_report::studies::study::{plan, report, write_tables};
 
+use super::recording::ReadingArguments;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, output, print, print_notes, progress, width};
 
@@ -19,8 +20,10 @@ pub(super) struct Arguments {
     file: PathBuf,
     /// Keep a person's drive, such as the log of the lab, as the recording of a session (N: its repetition, from the
     /// second on); may be repeated
-    #[arg(long, value_name = "PARTICIPANT/CONDITION[/N]=FILE.csv")]
+    #[arg(long, value_name = "PARTICIPANT/CONDITION[/N]=FILE")]
     import: Vec<Import>,
+    #[command(flatten)]
+    reading: ReadingArguments,
     /// Only check the file, and print who drives what in which order
     #[arg(long, conflicts_with_all = ["import", "json"])]
     dry_run: bool,
@@ -44,9 +47,15 @@ impl std::str::FromStr for Import {
                 session: session.into(),
                 file: file.into(),
             }),
-            _ => Err(format!("{text:?} is no PARTICIPANT/CONDITION=FILE.csv")),
+            _ => Err(format!("{text:?} is no PARTICIPANT/CONDITION=FILE")),
         }
     }
+}
+
+/// Whether a file is kept as it is.
+fn is_plain(file: &Path) -> bool {
+    file.extension()
+        .is_none_or(|extension| extension.eq_ignore_ascii_case("csv"))
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -60,9 +69,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     output::check(out, "study", &[])?;
     let missing = study.missing(out)?.len();
     for import in &arguments.import {
-        study
-            .import(out, &import.session, &import.file)
-            .map_err(|e| format!("--import {}: {e}", import.session))?;
+        let fail = |e: String| format!("--import {}: {e}", import.session);
+        let imported = match is_plain(&import.file) && !arguments.reading.is_given() {
+            true => study.import(out, &import.session, &import.file),
+            false => {
+                let csv = arguments
+                    .reading
+                    .table(&import.file)
+                    .map_err(|BadInput(e)| fail(e))?;
+                study.import_table(out, &import.session, (&import.file, &csv))
+            }
+        };
+        imported.map_err(|e| fail(e.to_string()))?;
     }
     output::keeps(out, "session")?;
     progress::over(missing as u64, "sessions", |done| study.run(out, done))?;

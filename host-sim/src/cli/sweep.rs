@@ -56,7 +56,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         return replay(arguments, &sweep, drive);
     }
     let out = arguments.results.directory();
-    output::check(out, "sweep", kept(out))?;
+    // A shard that began at the same time may have made the directory a sweep's between the two looks.
+    output::check(out, "sweep", kept(out)).or_else(|_| output::check(out, "sweep", kept(out)))?;
     let store = Store::open(&sweep, VERSION, out)?;
     output::keeps(out, "chunk")?;
     let threads = arguments.threads.threads;

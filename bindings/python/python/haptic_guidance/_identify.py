@@ -136,6 +136,12 @@ class Fit:
         return self.results["notes"]
 
     @property
+    def reading(self) -> list[tuple[str, str, str]]:
+        """What was left out, merged, cut, mended, guessed or converted when the drive was read: what, found, done."""
+        preflight = self.results["preflight"] or {"reading": []}
+        return [tuple(row) for row in preflight["reading"]]
+
+    @property
     def refuted(self) -> list[Any]:
         """Assumptions that the record refutes: with any, nothing is identified."""
         return self.results["refuted"]
@@ -172,8 +178,10 @@ def identify(
     preprocessing: bool = True,
     lane_smoothing: bool = True,
     map: Optional[Mapping[str, str]] = None,
+    time: Optional[str] = None,
     layout: Union[str, os.PathLike[str], None] = None,
     dbc: Union[str, os.PathLike[str], None] = None,
+    bus: Optional[str] = None,
     vehicle: Optional[Scenario] = None,
 ) -> Fit:
     """Identify the driver of a recorded drive.
@@ -207,13 +215,17 @@ def identify(
         False takes the lane signals as they are: no camera noise is estimated and removed.
     map : mapping of str to str, optional
         Columns of another name or unit, such as ``{"wheel_angle_rad": "SteeringAngle*0.0174533"}`` or
-        ``{"speed_m_per_s": "Speed [km/h]"}``. Without a scale the unit is converted if the file or the name says it.
+        ``{"speed_m_per_s": "Speed [km/h]"}``. Without unit and factor the unit is converted if the file or the name says it.
+    time : str, optional
+        The channel that is the time, if it is not ``time_s``, with a unit or a factor as in `map`.
     layout : str or path, optional
         Whose recording the file is: ``"openlka"``, ``"openpilot"``, ``"sadc"``, ``"udacity"``, ``"cognitive-driver-model"``, or a
         layout of one's own (``.toml``). Of a drive that an automation shares in turns, `manual` takes the stretches by hand,
         otherwise the others are taken.
     dbc : path, optional
         What the frames of a recording of the bus mean, if it is not the product's own bus.
+    bus : str, optional
+        The bus of a recording of several, by its name there: an interface (``"can0"``) or the number of a channel.
     vehicle : Scenario, optional
         The vehicle of a recording of the bus, if not that of table 9. The bus does not carry the driver's far point; it is
         computed with this vehicle.
@@ -230,6 +242,8 @@ def identify(
     fixed = [f"{name}={float(value)!r}" for name, value in (fix or {}).items()]
     wanted = [name if ends is None else f"{name}={ends[0]!r}..{ends[1]!r}" for name, ends in (estimate or {}).items()]
     maps = dict(map or {})
+    if time is not None and maps.setdefault("time_s", time) != time:
+        raise InputError("time: map names time_s too")
     if isinstance(also, (str, os.PathLike, Mapping, Run)):
         raise InputError("also: a list of drives is wanted")
     if also and as_published:
@@ -238,7 +252,7 @@ def identify(
         raise InputError("pieces: one drive and no as_published is wanted")
     drives = [drive, *also]
     files = [isinstance(each, (str, os.PathLike)) for each in drives]
-    for name, given in (("dbc", dbc), ("vehicle", vehicle)):
+    for name, given in (("dbc", dbc), ("bus", bus), ("vehicle", vehicle)):
         if given is not None and not all(files):
             raise InputError(f"{name}: only for a recording of the bus; columns need none")
     if layout is not None and not all(files):
@@ -256,6 +270,7 @@ def identify(
         maps=[f"{name}={channel}" for name, channel in maps.items()],
         layout=None if layout is None else os.fspath(layout),
         dbc=None if dbc is None else os.fspath(dbc),
+        bus=bus,
         vehicle=vehicle,
     )
     given = [os.fspath(each) if file else _columns(each) for each, file in zip(drives, files)]

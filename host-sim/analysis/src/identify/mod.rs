@@ -31,7 +31,7 @@ mod verdict;
 mod wide;
 
 pub use balance::Balance;
-pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_recording_with};
+pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack};
 pub use change::{Change, Constancy};
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use drivers::{Difference, Population, differences, population, value_and_error};

@@ -1,6 +1,6 @@
 //! A recording of a layout, row by row, with what the ECU would have seen.
 
-use haptic_analysis::identify::Layout;
+use haptic_analysis::identify::{Layout, Mapping};
 use haptic_log::formats::Format;
 
 /// The guidance's near and far point ahead, s (table 8).
@@ -29,8 +29,13 @@ pub(super) struct Rows {
 
 impl Rows {
     /// The rows of a file; none where it is refused as a whole, or lacks what is asked.
-    pub(super) fn read(layout: &Layout, bytes: &[u8], format: Option<Format>) -> Option<Self> {
-        let (time_s, mut table) = layout.signals(bytes, format, &[]).ok()?;
+    pub(super) fn read(
+        layout: &Layout,
+        bytes: &[u8],
+        format: Option<Format>,
+        maps: &[Mapping],
+    ) -> Option<Self> {
+        let (time_s, mut table) = layout.signals(bytes, format, maps).ok()?;
         let yaw = table.remove("yaw_angle_rad");
         let mut column = |name: &str| table.remove(name);
         let shared: Vec<bool> = column("shared")?.iter().map(|s| *s > 0.5).collect();

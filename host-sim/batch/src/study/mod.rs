@@ -166,6 +166,20 @@ impl Study {
     /// # Errors
     /// A session that the study does not have, is simulated or is recorded already; a file that is no drive of it.
     pub fn import(&self, out: &Path, what: &str, file: &Path) -> Result<(), StudyError> {
+        let csv = std::fs::read(file).map_err(|e| InputError::new(file.display(), e));
+        self.import_table(out, what, (file, &csv?))
+    }
+
+    /// The same of a table of another file, as CSV.
+    ///
+    /// # Errors
+    /// As [`Study::import`].
+    pub fn import_table(
+        &self,
+        out: &Path,
+        what: &str,
+        (file, csv): (&Path, &[u8]),
+    ) -> Result<(), StudyError> {
         let found = self.sessions.iter().find(|s| s.name() == what);
         let Some(session) = found else {
             let names: Vec<String> = self
@@ -186,7 +200,7 @@ impl Study {
         if place.exists() {
             return Err(store::already(&place));
         }
-        store::import(self, session, out, file)
+        store::import(self, session, out, (file, csv))
     }
 
     /// Drives the simulated sessions that are missing; `done` is called after each, from any thread. What is recorded in `out` is

@@ -128,14 +128,18 @@ pub(super) fn keep_run(study: &Study, session: &Session, out: &Path, run: &Run) 
 }
 
 /// Keeps what a person's drive left, byte for byte, if it is one of this session.
-pub(super) fn import(study: &Study, session: &Session, out: &Path, file: &Path) -> Result<(), StudyError> {
-    let csv = fs::read(file).map_err(|e| InputError::new(file.display(), e))?;
-    let trace = Trace::read_csv(&csv[..]).map_err(|e| InputError::new(file.display(), e))?;
+pub(super) fn import(
+    study: &Study,
+    session: &Session,
+    out: &Path,
+    (file, csv): (&Path, &[u8]),
+) -> Result<(), StudyError> {
+    let trace = Trace::read_csv(csv).map_err(|e| InputError::new(file.display(), e))?;
     let checked = check(session, &trace)
         .and_then(|()| check_hands(&trace))
         .and_then(|()| check_road(session, &trace));
     checked.map_err(|e| InputError::new(file.display(), e))?;
-    keep(study, session, out, &csv, Source::Imported, false)
+    keep(study, session, out, csv, Source::Imported, false)
 }
 
 /// A drive in which nobody drove says nothing of anybody.

@@ -72,7 +72,10 @@ impl<'a> Store<'a> {
         match fs::read_to_string(&path) {
             Ok(there) if there == text => {}
             Ok(_) => return Err(StoreError::Another(directory.into())),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => store.write(&path, text.as_bytes())?,
+            // In the directory itself the unfinished file would be somebody's to a shard that begins at the same time.
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                store.write_by(&store.beside(&chunks.join("sweep.toml")), &path, text.as_bytes())?;
+            }
             Err(e) => return Err(StoreError::file(&path, e)),
         }
         Ok(store)
@@ -136,12 +139,15 @@ impl<'a> Store<'a> {
 
     /// The file whole or not at all: written beside its place, then moved there.
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-        let beside = self.beside(path);
-        let written = fs::File::create(&beside).and_then(|mut file| {
+        self.write_by(&self.beside(path), path, bytes)
+    }
+
+    fn write_by(&self, beside: &Path, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+        let written = fs::File::create(beside).and_then(|mut file| {
             file.write_all(bytes)?;
             file.sync_all()
         });
-        let moved = written.and_then(|()| fs::rename(&beside, path));
+        let moved = written.and_then(|()| fs::rename(beside, path));
         moved.map_err(|e| StoreError::file(path, e))
     }
 

@@ -1,186 +1,357 @@
 //! Vector's BLF: objects in compressed containers behind a heading with the start's date.
 //!
-//! Read are data frames of classic CAN (objects 1 and 86); times are since 1970, as python-can gives them, to the
-//! nanosecond. The crate blf_asc is not used: it reads an object of size zero for ever.
+//! Read are data frames (objects 1 and 86 of classic CAN, 100 and 101 of CAN FD, which hold classic frames too); times are
+//! since 1970, as python-can gives them, to the nanosecond. One container is in memory at a time. The crate blf_asc is not
+//! used: it reads an object of size zero for ever.
+
+use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use super::bytes::{Budget, Bytes};
 use super::calendar;
-use crate::candump::CandumpFrame;
-use crate::recording::RecordingError;
+use crate::bus::{BusFrame, Form, Intake, Numbers, Take, length_code};
+use crate::notes::{Fate, Notes, Part};
+use crate::recording::{RecordingError, refuse};
 
 const SIGNATURE: &[u8] = b"LOGG";
 const OBJECT: &[u8] = b"LOBJ";
 const HEADING: u32 = 144;
-const CAN_MESSAGE: u32 = 1;
 const CONTAINER: u32 = 10;
+const CAN_MESSAGE: u32 = 1;
 const CAN_MESSAGE_2: u32 = 86;
+const FD_MESSAGE: u32 = 100;
+const FD_MESSAGE_64: u32 = 101;
+const ERRORS: [u32; 3] = [2, 73, 104];
 const EXTENDED: u32 = 1 << 31;
 const REMOTE: u8 = 0x80;
+const SENT: u8 = 1;
 const OBJECT_HEAD: u64 = 16;
+/// Largest object that is believed: those of CAN have 150 bytes, containers of Vector's tools 128 KB.
+const LARGEST: u64 = 64 << 20;
 
-/// Every data frame of classic CAN; `line` is the number of the object.
-///
-/// # Errors
-/// Another file, a damaged one.
-pub fn parse(file: &[u8]) -> Result<Vec<CandumpFrame>, RecordingError> {
-    if !file.starts_with(SIGNATURE) {
+/// Reads the data frames of one file, of which `size` is the length; of one bus if one is wanted. What is cut or damaged is
+/// counted, and read as far as it goes.
+pub(super) fn read(
+    input: &mut dyn Read,
+    size: u64,
+    bus: Option<&str>,
+    take: &mut Take<'_>,
+) -> Result<Notes, RecordingError> {
+    let mut intake = Intake::new("object", bus, take);
+    let head = up_to(input, 72)?;
+    if !head.starts_with(SIGNATURE) {
         return Err("this is no BLF file: it does not begin with LOGG".into());
     }
-    let bytes = Bytes(file);
+    let head = Bytes(&head);
     let mut start = [0; 8];
     for (i, part) in start.iter_mut().enumerate() {
-        *part = bytes.u16(40 + 2 * i as u64)?;
+        *part = head.u16(40 + 2 * i as u64)?;
     }
-    let start_ms = calendar::ms(start).unwrap_or(0);
-    let mut at = u64::from(bytes.u32(4)?.max(72));
-    // Objects may straddle containers, so that their contents are one stream.
-    let (mut stream, mut budget) = (Vec::new(), Budget::new(file));
-    while at + OBJECT_HEAD <= file.len() as u64 {
-        let (size, kind) = head(bytes, at)?;
-        if kind == CONTAINER {
-            let method = bytes.u16(at + OBJECT_HEAD)?;
-            let from = OBJECT_HEAD + 16;
-            let inside = bytes.slice(at + from, size.checked_sub(from).ok_or_else(|| too_small(at))?)?;
-            match method {
-                0 => stream.extend_from_slice(inside),
-                2 => {
-                    let inflated = budget.inflated(inside);
-                    stream.extend(inflated.map_err(|e| RecordingError(format!("byte {at}: {e}")))?);
-                }
-                other => return Err(format!("byte {at}: compression {other} is not known").into()),
-            }
-        } else {
-            stream.extend_from_slice(bytes.slice(at, size)?);
-            stream.resize(stream.len().next_multiple_of(4), 0);
-        }
-        at += size + size % 4;
-    }
-    frames(Bytes(&stream), start_ms)
-}
-
-fn too_small(at: u64) -> RecordingError {
-    RecordingError(format!("byte {at}: an object is smaller than its head"))
-}
-
-/// Size and kind of the object at a place.
-fn head(bytes: Bytes<'_>, at: u64) -> Result<(u64, u32), RecordingError> {
-    if bytes.slice(at, 4)? != OBJECT {
-        return Err(format!("byte {at}: no object (LOBJ) where one has to be").into());
-    }
-    let size = u64::from(bytes.u32(at + 8)?);
-    if size < OBJECT_HEAD {
-        return Err(too_small(at));
-    }
-    Ok((size, bytes.u32(at + 12)?))
-}
-
-fn frames(stream: Bytes<'_>, start_ms: u64) -> Result<Vec<CandumpFrame>, RecordingError> {
-    let mut frames = Vec::new();
-    let (mut at, mut number) = (0, 0);
-    while at + OBJECT_HEAD <= stream.0.len() as u64 {
-        // Writers fill up to a multiple of four, some by the remainder instead.
-        while at < stream.0.len() as u64 - 4
-            && !stream.slice(at, 4)?.starts_with(OBJECT)
-            && stream.u8(at)? == 0
-        {
-            at += 1;
-        }
-        if at + OBJECT_HEAD > stream.0.len() as u64 {
-            break;
-        }
-        let (size, kind) = head(stream, at)?;
-        number += 1;
-        if kind == CAN_MESSAGE || kind == CAN_MESSAGE_2 {
-            let head_size = u64::from(stream.u16(at + 4)?);
-            let ticks = stream.u64(at + 24)?;
-            let ns = match stream.u32(at + 16)? {
-                1 => ticks.saturating_mul(10_000),
-                _ => ticks,
-            };
-            let body = at + head_size;
-            let (flags, length) = (stream.u8(body + 2)?, stream.u8(body + 3)?.min(8));
-            let id = stream.u32(body + 4)?;
-            let data = stream.slice(body + 8, length.into())?.to_vec();
-            if flags & REMOTE == 0 {
-                // Whole milliseconds and the rest apart: the sum is rounded once.
-                let total_ns = u128::from(start_ms) * 1_000_000 + u128::from(ns);
-                let extended = id & EXTENDED != 0;
-                let id = id & 0x1FFF_FFFF;
-                frames.push(CandumpFrame {
-                    line: number,
-                    time_s: total_ns as f64 / 1e9,
-                    id,
-                    extended,
-                    data,
-                });
-            }
-        }
-        at += size;
-    }
-    Ok(frames)
-}
-
-pub(super) fn write(frames: &[CandumpFrame]) -> Vec<u8> {
-    const MOST: usize = 128 * 1024;
-    let ns = |time_s: f64| (time_s.max(0.0) * 1e9).round() as u64;
-    let start_ms = frames.first().map_or(0, |frame| ns(frame.time_s) / 1_000_000);
-    let stop_ms = frames.last().map_or(0, |frame| ns(frame.time_s) / 1_000_000);
-    let mut containers = Vec::new();
-    let mut uncompressed = u64::from(HEADING);
-    let mut inside = Vec::new();
-    let mut close = |inside: &mut Vec<u8>| {
-        let packed = miniz_oxide::deflate::compress_to_vec_zlib(inside, 6);
-        let size = 32 + packed.len() as u32;
-        containers.extend_from_slice(OBJECT);
-        containers.extend_from_slice(&16_u16.to_le_bytes());
-        containers.extend_from_slice(&1_u16.to_le_bytes());
-        containers.extend_from_slice(&size.to_le_bytes());
-        containers.extend_from_slice(&CONTAINER.to_le_bytes());
-        containers.extend_from_slice(&[2, 0, 0, 0, 0, 0, 0, 0]);
-        containers.extend_from_slice(&(inside.len() as u32).to_le_bytes());
-        containers.extend_from_slice(&[0; 4]);
-        containers.extend_from_slice(&packed);
-        containers.resize(containers.len() + size as usize % 4, 0);
-        uncompressed += 32 + inside.len() as u64;
-        inside.clear();
+    let (said_size, said_objects) = (head.u64(16)?, head.u32(32)?);
+    let mut stream = Stream {
+        bytes: Vec::new(),
+        start_ms: calendar::ms(start).unwrap_or(0),
+        frame: BusFrame::default(),
     };
-    for frame in frames {
+    let mut at = u64::from(head.u32(4)?.max(72));
+    up_to(input, at - 72)?;
+    let mut budget = Budget::of_size(size);
+    let mut is_damaged = false;
+    let is_whole = loop {
+        let head = up_to(input, OBJECT_HEAD)?;
+        let Some((length, kind)) = object(&head) else {
+            break head.iter().all(|byte| *byte == 0);
+        };
+        let mut body = up_to(input, length - OBJECT_HEAD)?;
+        let is_whole = body.len() as u64 == length - OBJECT_HEAD;
+        let mut is_good = true;
+        if kind == CONTAINER {
+            is_good = contents(&body, &mut budget, &mut stream.bytes)?;
+        } else {
+            stream.bytes.extend_from_slice(&head);
+            stream.bytes.append(&mut body);
+            stream.bytes.resize(stream.bytes.len().next_multiple_of(4), 0);
+        }
+        stream.frames(&mut intake)?;
+        if !is_good {
+            // What the container began does not go on in the next one.
+            stream.bytes.clear();
+            is_damaged = true;
+        }
+        if !is_whole {
+            break false;
+        }
+        up_to(input, length % 4)?;
+        at += length + length % 4;
+    };
+    if is_damaged || !is_whole || said_size > size || stream.bytes.starts_with(OBJECT) {
+        // The heading says how many there were, unless its writer never came to that.
+        let missing = u64::from(said_objects)
+            .saturating_sub(stream.frame.line as u64)
+            .max(1);
+        let place = format_args!("byte {at}");
+        intake.notes.count_many(
+            Fate::Cut,
+            Part::Object,
+            "the file is cut or damaged",
+            missing,
+            place,
+        );
+    }
+    intake.finish()
+}
+
+/// Reads so many bytes, or what is left.
+fn up_to(input: &mut dyn Read, size: u64) -> Result<Vec<u8>, RecordingError> {
+    let mut bytes = Vec::new();
+    input.take(size).read_to_end(&mut bytes).map_err(refuse)?;
+    Ok(bytes)
+}
+
+/// Size and kind of an object by its head; none where there is no object.
+fn object(head: &[u8]) -> Option<(u64, u32)> {
+    let bytes = Bytes(head);
+    let size = bytes.u32(8).ok()?.into();
+    let is_one = head.starts_with(OBJECT) && (OBJECT_HEAD..LARGEST).contains(&size);
+    is_one.then_some((size, bytes.u32(12).ok()?))
+}
+
+/// What stands in a container, to the stream of all of them: objects may straddle two. False if it is damaged or cut.
+fn contents(body: &[u8], budget: &mut Budget, stream: &mut Vec<u8>) -> Result<bool, RecordingError> {
+    let Some((head, inside)) = body.split_at_checked(16) else {
+        return Ok(false);
+    };
+    match Bytes(head).u16(0)? {
+        0 => stream.extend_from_slice(inside),
+        2 => {
+            let (inflated, is_whole) = budget.inflated_as_far(inside)?;
+            stream.extend(inflated);
+            return Ok(is_whole);
+        }
+        other => return Err(format!("compression {other} of a container is not known").into()),
+    }
+    Ok(true)
+}
+
+/// The contents of the containers that are not read yet.
+struct Stream {
+    bytes: Vec<u8>,
+    start_ms: u64,
+    frame: BusFrame,
+}
+
+impl Stream {
+    /// Reads the objects that are there as a whole.
+    fn frames(&mut self, intake: &mut Intake<'_>) -> Result<(), RecordingError> {
+        let bytes = std::mem::take(&mut self.bytes);
+        let mut at = 0;
+        // Writers fill up to a multiple of four, some by the remainder instead; behind damage the next object goes on.
+        while let Some(next) = bytes[at..].windows(4).position(|four| four == OBJECT) {
+            at += next;
+            let Some(head) = bytes.get(at..at + OBJECT_HEAD as usize) else {
+                break;
+            };
+            let Some((size, kind)) = object(head) else {
+                at += OBJECT.len();
+                continue;
+            };
+            let Some(whole) = bytes.get(at..at + size as usize) else {
+                break;
+            };
+            self.frame.line += 1;
+            match self.message(kind, Bytes(whole)) {
+                Ok(Found::Frame) => intake.frame(&self.frame)?,
+                Ok(Found::Other(part, why)) => intake.left_out(part, why, self.frame.line),
+                Err(_) => intake.left_out(Part::Object, "damaged", self.frame.line),
+            }
+            at += size as usize;
+        }
+        self.bytes = bytes;
+        self.bytes.drain(..at);
+        Ok(())
+    }
+
+    /// Fills the frame from an object.
+    fn message(&mut self, kind: u32, object: Bytes<'_>) -> Result<Found, RecordingError> {
+        if ERRORS.contains(&kind) {
+            return Ok(Found::Other(Part::Frame, "error frame"));
+        }
+        let body = u64::from(object.u16(4)?);
+        let (channel, flags, code) = (object.u16(body), object.u8(body + 2), object.u8(body + 3));
+        // Place and number of the bytes; bits of CAN FD, of the switched rate and of the sender's state.
+        let (channel, flags, from, length, bits) = match kind {
+            CAN_MESSAGE | CAN_MESSAGE_2 => (channel?, flags?, 8, code?.min(8), [false; 3]),
+            FD_MESSAGE => {
+                let bits = object.u8(body + 13)?;
+                let bits = [1, 2, 4].map(|bit| bits & bit != 0);
+                (channel?, flags?, 20, object.u8(body + 14)?, bits)
+            }
+            FD_MESSAGE_64 => {
+                let bits = object.u32(body + 12)?;
+                let remote = if bits & 0x10 != 0 { REMOTE } else { 0 };
+                let flags = remote | u8::from(object.u8(body + 34)? != 0);
+                let bits = [0x1000, 0x2000, 0x4000].map(|bit| bits & bit != 0);
+                (object.u8(body)?.into(), flags, 40, object.u8(body + 2)?, bits)
+            }
+            _ => return Ok(Found::Other(Part::Object, "no frame of CAN")),
+        };
+        if flags & REMOTE != 0 {
+            return Ok(Found::Other(Part::Frame, "remote frame"));
+        }
+        let frame = &mut self.frame;
+        frame.form = match bits {
+            [true, switched, passive] => Form::Fd { switched, passive },
+            [false, ..] => Form::Classic,
+        };
+        let id = object.u32(body + 4)?;
+        (frame.id, frame.extended) = (id & 0x1FFF_FFFF, id & EXTENDED != 0);
+        let length = usize::from(length);
+        if length > frame.form.most_bytes() || (frame.id > 0x7FF && !frame.extended) {
+            return Err("no frame".into());
+        }
+        frame.data.clear();
+        frame
+            .data
+            .extend_from_slice(object.slice(body + from, length as u64)?);
+        frame.sent = flags & SENT != 0;
+        frame.bus.clear();
+        // Writing to a string does not fail.
+        let _ = std::fmt::Write::write_fmt(&mut frame.bus, format_args!("{channel}"));
+        let ticks = object.u64(24)?;
+        let ns = match object.u32(16)? {
+            1 => ticks.saturating_mul(10_000),
+            _ => ticks,
+        };
+        // Whole milliseconds and the rest apart: the sum is rounded once.
+        let total_ns = u128::from(self.start_ms) * 1_000_000 + u128::from(ns);
+        frame.time_s = total_ns as f64 / 1e9;
+        Ok(Found::Frame)
+    }
+}
+
+/// What an object is.
+enum Found {
+    Frame,
+    Other(Part, &'static str),
+}
+
+/// A file that is being written; its heading is written last, when the sums are known.
+pub(super) struct Writer<W> {
+    out: W,
+    pub(super) numbers: Numbers,
+    inside: Vec<u8>,
+    /// Milliseconds of the first and the last frame.
+    span_ms: Option<[u64; 2]>,
+    uncompressed: u64,
+    frames: u32,
+}
+
+const MOST: usize = 128 * 1024;
+
+impl<W: Write + Seek> Writer<W> {
+    pub(super) fn new(mut out: W) -> io::Result<Self> {
+        out.write_all(&[0; HEADING as usize])?;
+        Ok(Self {
+            out,
+            numbers: Numbers::default(),
+            inside: Vec::with_capacity(MOST),
+            span_ms: None,
+            uncompressed: HEADING.into(),
+            frames: 0,
+        })
+    }
+
+    pub(super) fn frame(&mut self, frame: &BusFrame) -> io::Result<()> {
+        let time_ns = (frame.time_s.max(0.0) * 1e9).round() as u64;
+        let now_ms = time_ns / 1_000_000;
+        let [start_ms, stop_ms] = self.span_ms.get_or_insert([now_ms; 2]);
+        *stop_ms = now_ms;
+        let since_ns = time_ns.saturating_sub(*start_ms * 1_000_000);
+        let channel = self.numbers.of(&frame.bus).to_le_bytes();
+        let id = (frame.id | if frame.extended { EXTENDED } else { 0 }).to_le_bytes();
+        let length = frame.data.len() as u8;
+        let code = length_code(frame.data.len());
+        let head = [
+            channel[0],
+            channel[1],
+            u8::from(frame.sent),
+            code,
+            id[0],
+            id[1],
+            id[2],
+            id[3],
+        ];
+        let mut body = head.to_vec();
+        let kind = match frame.form {
+            Form::Classic => CAN_MESSAGE,
+            Form::Fd { switched, passive } => {
+                let bits = 1 | u8::from(switched) << 1 | u8::from(passive) << 2;
+                body.extend([0, 0, 0, 0, 0, bits, length, 0, 0, 0, 0, 0]);
+                FD_MESSAGE
+            }
+        };
+        let most = body.len() + frame.form.most_bytes();
+        body.extend(&frame.data);
+        body.resize(most, 0);
+        let inside = &mut self.inside;
         inside.extend_from_slice(OBJECT);
         inside.extend_from_slice(&32_u16.to_le_bytes());
         inside.extend_from_slice(&1_u16.to_le_bytes());
-        inside.extend_from_slice(&48_u32.to_le_bytes());
-        inside.extend_from_slice(&CAN_MESSAGE.to_le_bytes());
+        inside.extend_from_slice(&(32 + body.len() as u32).to_le_bytes());
+        inside.extend_from_slice(&kind.to_le_bytes());
         // Nanoseconds.
         inside.extend_from_slice(&2_u32.to_le_bytes());
         inside.extend_from_slice(&[0; 4]);
-        let since_ns = ns(frame.time_s).saturating_sub(start_ms * 1_000_000);
         inside.extend_from_slice(&since_ns.to_le_bytes());
-        inside.extend_from_slice(&1_u16.to_le_bytes());
-        inside.push(0);
-        inside.push(frame.data.len() as u8);
-        inside.extend_from_slice(&(frame.id | if frame.extended { EXTENDED } else { 0 }).to_le_bytes());
-        let mut data = [0; 8];
-        data[..frame.data.len()].copy_from_slice(&frame.data);
-        inside.extend_from_slice(&data);
-        if inside.len() + 48 > MOST {
-            close(&mut inside);
+        inside.append(&mut body);
+        self.frames += 1;
+        if self.inside.len() + 128 > MOST {
+            self.close()?;
         }
+        Ok(())
     }
-    if !inside.is_empty() {
-        close(&mut inside);
+
+    /// Writes a container.
+    fn close(&mut self) -> io::Result<()> {
+        let packed = miniz_oxide::deflate::compress_to_vec_zlib(&self.inside, 6);
+        let size = 32 + packed.len() as u32;
+        let mut head = OBJECT.to_vec();
+        head.extend_from_slice(&16_u16.to_le_bytes());
+        head.extend_from_slice(&1_u16.to_le_bytes());
+        head.extend_from_slice(&size.to_le_bytes());
+        head.extend_from_slice(&CONTAINER.to_le_bytes());
+        head.extend_from_slice(&[2, 0, 0, 0, 0, 0, 0, 0]);
+        head.extend_from_slice(&(self.inside.len() as u32).to_le_bytes());
+        head.extend_from_slice(&[0; 4]);
+        self.out.write_all(&head)?;
+        self.out.write_all(&packed)?;
+        self.out.write_all(&[0; 4][..size as usize % 4])?;
+        self.uncompressed += 32 + self.inside.len() as u64;
+        self.inside.clear();
+        Ok(())
     }
-    let mut file = Vec::with_capacity(HEADING as usize + containers.len());
-    file.extend_from_slice(SIGNATURE);
-    file.extend_from_slice(&HEADING.to_le_bytes());
-    file.extend_from_slice(&[5, 0, 0, 0, 2, 6, 8, 1]);
-    file.extend_from_slice(&(u64::from(HEADING) + containers.len() as u64).to_le_bytes());
-    file.extend_from_slice(&uncompressed.to_le_bytes());
-    file.extend_from_slice(&(frames.len() as u32).to_le_bytes());
-    file.extend_from_slice(&[0; 4]);
-    for part in [start_ms, stop_ms].map(calendar::date).as_flattened() {
-        file.extend_from_slice(&part.to_le_bytes());
+
+    pub(super) fn finish(mut self) -> io::Result<()> {
+        if !self.inside.is_empty() {
+            self.close()?;
+        }
+        let size = self.out.stream_position()?;
+        let mut head = SIGNATURE.to_vec();
+        head.extend_from_slice(&HEADING.to_le_bytes());
+        head.extend_from_slice(&[5, 0, 0, 0, 2, 6, 8, 1]);
+        head.extend_from_slice(&size.to_le_bytes());
+        head.extend_from_slice(&self.uncompressed.to_le_bytes());
+        head.extend_from_slice(&self.frames.to_le_bytes());
+        head.extend_from_slice(&[0; 4]);
+        for part in self
+            .span_ms
+            .unwrap_or_default()
+            .map(calendar::date)
+            .as_flattened()
+        {
+            head.extend_from_slice(&part.to_le_bytes());
+        }
+        self.out.seek(SeekFrom::Start(0))?;
+        self.out.write_all(&head)?;
+        self.out.flush()
     }
-    file.resize(HEADING as usize, 0);
-    file.extend_from_slice(&containers);
-    file
 }

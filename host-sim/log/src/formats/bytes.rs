@@ -50,6 +50,18 @@ impl<'a> Bytes<'a> {
     }
 }
 
+/// A float of 16 bits (IEEE 754, binary16).
+pub(super) fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 0x3FF));
+    let size = match exponent {
+        0 => fraction * 2_f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1024.0 + fraction) * 2_f64.powi(exponent - 25),
+    };
+    if bits >> 15 == 1 { -size } else { size }
+}
+
 /// What the bytes of a file may grow to: so much however small it is, and so many times its size.
 const USUAL: usize = 64 << 20;
 const TIMES: usize = 64;
@@ -64,7 +76,12 @@ pub(super) struct Budget {
 
 impl Budget {
     pub(super) fn new(file: &[u8]) -> Self {
-        let more = file.len().saturating_mul(TIMES);
+        Self::of_size(file.len() as u64)
+    }
+
+    /// The budget of a file of so many bytes.
+    pub(super) fn of_size(size: u64) -> Self {
+        let more = usize::try_from(size).unwrap_or(usize::MAX).saturating_mul(TIMES);
         Self {
             bytes: USUAL.saturating_add(more),
             values: USUAL_VALUES.saturating_add(more),
@@ -80,6 +97,24 @@ impl Budget {
         })?;
         self.bytes -= inflated.len();
         Ok(inflated)
+    }
+
+    /// Undoes zlib as far as the bytes are good, and says whether all are.
+    pub(super) fn inflated_as_far(&mut self, compressed: &[u8]) -> Result<(Vec<u8>, bool), RecordingError> {
+        let inflated = miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(compressed, self.bytes);
+        let (inflated, is_whole) = match inflated {
+            Ok(whole) => (whole, true),
+            Err(e) if e.status == TINFLStatus::HasMoreOutput => return Err(too_large()),
+            Err(e) => (e.output, false),
+        };
+        self.bytes -= inflated.len();
+        Ok((inflated, is_whole))
+    }
+
+    #[cfg(feature = "parquet")]
+    /// So many values, or as many as may still come.
+    pub(super) fn at_most(&self, values: usize) -> usize {
+        values.min(self.values)
     }
 
     /// Takes so many values.

@@ -3,8 +3,13 @@
 //! Read are real vectors of any class, plain or compressed, and matrices of a few of them beside each other. The crate matfile is not used: it reads numbers alone, so the
 //! units would be lost.
 
+use std::io::Write;
+
+use super::Table;
 use super::bytes::{Budget, Bytes};
-use crate::recording::{Group, RecordingError, Series};
+use crate::notes::Fate;
+use crate::recording::{Group, RecordingError, Series, Term, refuse};
+use crate::units;
 
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
@@ -123,7 +128,7 @@ fn matrix(b: Bytes<'_>, depth: u32) -> Result<(String, Value), RecordingError> {
     Ok((name, value))
 }
 
-pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
+pub(super) fn read(file: &[u8], time: Option<&Term>) -> Result<Table, RecordingError> {
     let b = Bytes(file);
     if file.starts_with(b"MATLAB 7.3") {
         return Err("this is MATLAB 7.3 (HDF5): save it with -v7".into());
@@ -137,7 +142,8 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
             return Err("this is no MAT file of level 5: save it with -v6 or -v7".into());
         }
     }
-    let (mut columns, mut units, mut sources) = (Vec::new(), Vec::new(), Vec::new());
+    let mut found = Table::default();
+    let (mut columns, mut units, mut sources) = (Vec::<Series>::new(), Vec::new(), Vec::new());
     let mut budget = Budget::new(file);
     let mut at = 128;
     while at + 8 <= file.len() as u64 {
@@ -183,23 +189,54 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
             }
             (name, Value::Fields(fields)) if name == "units" => units = fields,
             (name, Value::Fields(fields)) if name == "sources" => sources = fields,
-            _ => {}
+            (name, value) => {
+                let why = match value {
+                    Value::Text(_) => "text",
+                    Value::Fields(_) => "struct",
+                    Value::Matrix(..) => "array of more than 16 rows and columns",
+                    Value::Numbers(_) | Value::Other => "array, cell, object or complex numbers",
+                };
+                found.notes.channel(Fate::LeftOut, name, why);
+            }
         }
     }
-    let said = |fields: &[(String, Value)], name: &str| match fields.iter().find(|(field, _)| field == name) {
-        Some((_, Value::Text(text))) => text.clone(),
-        _ => String::new(),
-    };
     for column in &mut columns {
         column.unit = said(&units, &column.name);
         column.source = said(&sources, &column.name);
     }
-    // What is no channel: single values, vectors of another length than the time, or than the longest.
-    let time = columns.iter().find(|c| c.name == "time_s");
-    let longest = || columns.iter().map(|c| c.values.len()).max().unwrap_or(0);
-    let rows = time.map_or_else(longest, |c| c.values.len());
-    columns.retain(|column| column.values.len() == rows);
-    Ok(columns)
+    found.keep(columns, time);
+    Ok(found)
+}
+
+/// What a struct of texts says of a channel.
+fn said(fields: &[(String, Value)], name: &str) -> String {
+    match fields.iter().find(|(field, _)| field == name) {
+        Some((_, Value::Text(text))) => text.clone(),
+        _ => String::new(),
+    }
+}
+
+impl Table {
+    /// Keeps the vectors that are as long as the time, or where there is none as the longest.
+    fn keep(&mut self, columns: Vec<Series>, time: Option<&Term>) {
+        let wanted = time.map_or("time_s", |time| time.channel.as_str());
+        let time = columns
+            .iter()
+            .find(|c| c.name == wanted || c.name == units::bare(wanted));
+        let longest = || columns.iter().map(|c| c.values.len()).max().unwrap_or(0);
+        let rows = time.map_or_else(longest, |c| c.values.len());
+        for column in columns {
+            let why = match column.values.len() {
+                own if own == rows => {
+                    self.columns.push(column);
+                    continue;
+                }
+                0 | 1 => "a single value, or none".to_owned(),
+                _ => format!("other length than the {rows} values of the time"),
+            };
+            self.notes.channel(Fate::LeftOut, column.name, &why);
+        }
+    }
 }
 
 fn put(out: &mut Vec<u8>, kind: u32, contents: &[u8]) -> Result<(), RecordingError> {
@@ -250,7 +287,7 @@ fn valid(name: &str) -> Result<String, RecordingError> {
     Ok(valid)
 }
 
-pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
+pub(super) fn write(group: &Group, to: &mut impl Write) -> Result<(), RecordingError> {
     let mut heading = b"MATLAB 5.0 MAT-file, written by haptic-guidance".to_vec();
     heading.resize(124, b' ');
     heading.extend_from_slice(&[0, 1, b'I', b'M']);
@@ -267,6 +304,8 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     for (name, _, _, values) in &all {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         put_matrix(&mut out, DOUBLE, [rows, 1], name, &[(9, &bytes)])?;
+        to.write_all(&out).map_err(refuse)?;
+        out.clear();
     }
     let texts: [(&str, Vec<&str>); 2] = [
         ("units", all.iter().map(|(_, unit, ..)| *unit).collect()),
@@ -288,5 +327,5 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
         let parts: [(u32, &[u8]); 3] = [(5, &length), (1, &names), (MATRIX, &fields)];
         put_matrix(&mut out, STRUCT, [1, 1], what, &parts)?;
     }
-    Ok(out)
+    to.write_all(&out).map_err(refuse)
 }

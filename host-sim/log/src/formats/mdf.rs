@@ -1,15 +1,18 @@
 //! ASAM MDF 4. The crate mdf4-rs writes. It does not read: it takes a file's own word for where its blocks end, and panics on
 //! a damaged one; it reads no compressed records, and none that straddle blocks.
 //!
-//! Read are sorted and unsorted files, plain or with deflated blocks, numbers with linear, rational and tabular conversions,
-//! invalid values as NaN. Passed over are channels of text, bytes or arrays, and groups without a time.
+//! Read are sorted and unsorted files, plain or with deflated blocks, numbers with every conversion but formulas, and the
+//! fields of structures; invalid values are NaN. Left out by name are texts, bytes, arrays and groups without a time.
 
 use std::collections::{HashMap, HashSet};
 
 use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 
-use super::bytes::{Budget, Bytes};
+use super::Reading;
+use super::bytes::{Budget, Bytes, half};
+use crate::notes::{Fate, Notes, Part};
 use crate::recording::{Group, Recording, RecordingError, Series};
+use crate::units;
 
 const HEAD: u64 = 24;
 const SOURCE: &str = "source: ";
@@ -183,43 +186,109 @@ struct Place {
     conversion: Conversion,
 }
 
+#[derive(Clone)]
 enum Conversion {
     None,
     Linear([f64; 2]),
     Rational([f64; 6]),
-    Table { points: Vec<[f64; 2]>, between: bool },
+    Table {
+        points: Vec<[f64; 2]>,
+        between: bool,
+    },
+    /// Ranges, each with a conversion of its own, and what all other numbers are converted by.
+    Ranges {
+        rows: Vec<([f64; 2], Conversion)>,
+        other: Box<Conversion>,
+    },
+    /// To this number; to a text, which is none, as NaN.
+    To(f64),
 }
 
-/// The conversion at a link; none if it is not one of numbers to numbers.
-fn conversion(bytes: Bytes<'_>, at: u64) -> Result<Option<Conversion>, RecordingError> {
+/// Deepest conversions in conversions.
+const DEEPEST_CONVERSION: u32 = 4;
+
+/// The conversion at a link, or why there is none to numbers.
+fn conversion(
+    bytes: Bytes<'_>,
+    at: u64,
+    depth: u32,
+) -> Result<Result<Conversion, &'static str>, RecordingError> {
     if at == 0 {
-        return Ok(Some(Conversion::None));
+        return Ok(Ok(Conversion::None));
     }
-    let block = Block::at(bytes, at)?.expect("##CC")?;
+    let block = Block::at(bytes, at)?;
+    if [&b"##TX"[..], b"##MD"].contains(&block.kind()) {
+        return Ok(Ok(Conversion::To(f64::NAN)));
+    }
+    if depth > DEEPEST_CONVERSION {
+        return Err(format!("byte {at}: the conversions are nested too deep").into());
+    }
+    let block = block.expect("##CC")?;
     let data = block.data();
-    let count = u64::from(bytes.u16(data + 6)?);
+    let [refs, count] = [bytes.u16(data + 4)?, bytes.u16(data + 6)?].map(u64::from);
     let values = (0..count)
         .map(|i| bytes.f64(data + 24 + 8 * i))
         .collect::<Result<Vec<_>, _>>()?;
-    Ok(match (bytes.u8(data)?, &values[..]) {
-        // Codes with names stay codes.
-        (0 | 7 | 8, _) => Some(Conversion::None),
-        (1, [offset, factor]) => Some(Conversion::Linear([*offset, *factor])),
-        (2, &[a, b, c, d, e, f]) => Some(Conversion::Rational([a, b, c, d, e, f])),
-        (kind @ (4 | 5), _) if !values.is_empty() => Some(Conversion::Table {
+    Ok(Ok(match (bytes.u8(data)?, &values[..]) {
+        (0, _) => Conversion::None,
+        (1, [offset, factor]) => Conversion::Linear([*offset, *factor]),
+        (2, &[a, b, c, d, e, f]) => Conversion::Rational([a, b, c, d, e, f]),
+        (3, _) => return Ok(Err("formula")),
+        (kind @ (4 | 5), _) if !values.is_empty() => Conversion::Table {
             points: values.as_chunks::<2>().0.to_vec(),
             between: kind == 4,
-        }),
-        _ => None,
-    })
+        },
+        (6, _) if count % 3 == 1 => Conversion::Ranges {
+            rows: values
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .map(|&[low, high, to]| ([low, high], Conversion::To(to)))
+                .collect(),
+            other: Box::new(Conversion::To(values[values.len() - 1])),
+        },
+        (kind @ (7 | 8), _) => {
+            let ranges: Vec<[f64; 2]> = match kind {
+                7 => values.iter().map(|x| [*x, *x]).collect(),
+                _ => values.as_chunks::<2>().0.to_vec(),
+            };
+            let mut conversions = Vec::new();
+            for i in 0..refs.max(ranges.len() as u64 + 1) {
+                match conversion(bytes, block.link(4 + i), depth + 1)? {
+                    Ok(conversion) => conversions.push(conversion),
+                    Err(why) => return Ok(Err(why)),
+                }
+            }
+            let is_text = |to: &Conversion| matches!(to, Conversion::To(x) if x.is_nan());
+            let has_default = block.link(4 + ranges.len() as u64) != 0;
+            let other = conversions.swap_remove(ranges.len());
+            // Codes with names stay codes, where nothing but names is said of them.
+            if conversions.iter().all(is_text) && (!has_default || is_text(&other)) {
+                return Ok(Ok(Conversion::None));
+            }
+            let rows = ranges.into_iter().zip(conversions).collect();
+            let other = Box::new(other);
+            Conversion::Ranges { rows, other }
+        }
+        (9..=11, _) => return Ok(Err("text")),
+        _ => return Ok(Err("a conversion that is not known")),
+    }))
 }
 
 impl Conversion {
     fn apply(&self, x: f64) -> f64 {
         match self {
             Self::None => x,
+            Self::To(value) => *value,
             Self::Linear([offset, factor]) => offset + factor * x,
             Self::Rational([a, b, c, d, e, f]) => (a * x * x + b * x + c) / (d * x * x + e * x + f),
+            Self::Ranges { rows, other } => {
+                let is_in = |[low, high]: [f64; 2]| {
+                    low == x || (low <= x && (x < high || (x == high && x.fract() == 0.0)))
+                };
+                let found = rows.iter().find(|(range, _)| is_in(*range));
+                found.map_or(&**other, |(_, conversion)| conversion).apply(x)
+            }
             Self::Table { points, between } => {
                 let next = points.partition_point(|p| p[0] <= x);
                 let Some(low) = next.checked_sub(1).map(|i| points[i]) else {
@@ -241,30 +310,40 @@ impl Conversion {
     }
 }
 
-fn place(block: &Block<'_>, data_bytes: u64) -> Result<Option<Place>, RecordingError> {
+/// A channel of a group, or why it is none.
+fn place(
+    block: &Block<'_>,
+    name: String,
+    data_bytes: u64,
+) -> Result<Result<Place, &'static str>, RecordingError> {
     let (b, data) = (block.bytes, block.data());
     let (kind, flags) = (b.u8(data + 2)?, b.u32(data + 12)?);
     let bits = b.u32(data + 8)?;
     let channel_type = b.u8(data)?;
-    let name = text(b, block.link(2))?;
     let mut unit = text(b, block.link(6))?;
     if unit.is_empty() && block.link(4) != 0 {
         unit = text(b, Block::at(b, block.link(4))?.link(1))?;
     }
     let comment = text(b, block.link(7))?;
-    let Some(conversion) = conversion(b, block.link(4))? else {
-        return Ok(None);
-    };
-    let number = match kind {
-        0..=3 => (1..=64).contains(&bits),
-        4 | 5 => [32, 64].contains(&bits),
-        _ => false,
-    };
     let is_virtual = [3, 6].contains(&channel_type);
-    if !(number && [0, 2].contains(&channel_type) || is_virtual) {
-        return Ok(None);
+    let why = match (channel_type, kind, bits) {
+        _ if flags & 1 == 1 => Some("every value is invalid"),
+        (3 | 6, ..) | (0 | 2, 0..=3, 1..=64) | (0 | 2, 4 | 5, 16 | 32 | 64) => None,
+        (1, ..) | (_, 6..=9, _) => Some("text"),
+        (_, 10..=12, _) => Some("bytes"),
+        (_, 13 | 14, _) => Some("date"),
+        (_, 15 | 16, _) => Some("complex numbers"),
+        (4, ..) => Some("places in another file"),
+        _ => Some("a kind of number that is not known"),
+    };
+    if let Some(why) = why {
+        return Ok(Err(why));
     }
-    Ok(Some(Place {
+    let conversion = match conversion(b, block.link(4), 0)? {
+        Ok(conversion) => conversion,
+        Err(why) => return Ok(Err(why)),
+    };
+    Ok(Ok(Place {
         series: Series {
             name,
             unit,
@@ -309,10 +388,48 @@ impl Place {
         let number = match (self.kind / 2, self.bits) {
             (0, _) => (top >> (64 - self.bits)) as f64,
             (1, _) => ((top as i64) >> (64 - self.bits)) as f64,
+            (_, 16) => half(bits as u16),
             (_, 32) => f64::from(f32::from_bits(bits as u32)),
             _ => f64::from_bits(bits),
         };
         self.conversion.apply(number)
+    }
+
+    /// The values of whole records, the usual kinds of number by a loop of their own.
+    fn append(&mut self, records: &[u8], size: usize) {
+        fn each<const N: usize>(
+            records: &[u8],
+            (size, from): (usize, usize),
+            out: &mut Vec<f64>,
+            number: impl Fn([u8; N]) -> f64,
+        ) {
+            out.extend(records.chunks_exact(size).map(|record| {
+                let bytes = record.get(from..).and_then(|bytes| bytes.first_chunk::<N>());
+                bytes.map_or(f64::NAN, |bytes| number(*bytes))
+            }));
+        }
+        let is_plain = !self.is_virtual && self.bit.is_multiple_of(8) && self.invalid_bit.is_none();
+        let (place, to, out) = (
+            (size, (self.bit / 8) as usize),
+            &self.conversion,
+            &mut self.series.values,
+        );
+        out.reserve(records.len() / size);
+        match (self.kind, self.bits) {
+            (0, 8) if is_plain => each::<1>(records, place, out, |x| to.apply(x[0].into())),
+            (0, 16) if is_plain => each(records, place, out, |x| to.apply(u16::from_le_bytes(x).into())),
+            (0, 32) if is_plain => each(records, place, out, |x| to.apply(u32::from_le_bytes(x).into())),
+            (2, 16) if is_plain => each(records, place, out, |x| to.apply(i16::from_le_bytes(x).into())),
+            (2, 32) if is_plain => each(records, place, out, |x| to.apply(i32::from_le_bytes(x).into())),
+            (4, 32) if is_plain => each(records, place, out, |x| to.apply(f32::from_le_bytes(x).into())),
+            (4, 64) if is_plain => each(records, place, out, |x| to.apply(f64::from_le_bytes(x))),
+            _ => {
+                for (row, record) in records.chunks_exact(size).enumerate() {
+                    let value = self.value(record, row);
+                    self.series.values.push(value);
+                }
+            }
+        }
     }
 }
 
@@ -321,11 +438,70 @@ struct Open {
     name: String,
     size: u64,
     varying: bool,
-    rows: usize,
+    /// How many rows there are, as it says.
+    count: u64,
+    rows: u64,
     places: Vec<Place>,
 }
 
-pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
+/// What is met on the way through a file.
+struct Found<'a> {
+    reading: Reading<'a>,
+    unread: Vec<String>,
+    notes: Notes,
+}
+
+impl Found<'_> {
+    fn is_time(&self, name: &str) -> bool {
+        let named = self.reading.time.map(|term| term.channel.as_str());
+        named.is_some_and(|wanted| name == wanted || name == units::bare(wanted))
+    }
+
+    /// The channels of a chain, those inside structures too.
+    fn places(
+        &mut self,
+        bytes: Bytes<'_>,
+        at: u64,
+        data_bytes: u64,
+        depth: u32,
+        out: &mut Vec<Place>,
+    ) -> Result<(), RecordingError> {
+        if depth > DEEPEST {
+            return Err(format!("byte {at}: structures are nested too deep").into());
+        }
+        for channel in chain(bytes, at, "##CN")? {
+            let name = text(bytes, channel.link(2))?;
+            let parts = match channel.link(1) {
+                0 => None,
+                inside => Some(Block::at(bytes, inside)?),
+            };
+            match parts {
+                Some(parts) if parts.kind() == b"##CN" => {
+                    self.places(bytes, parts.at, data_bytes, depth + 1, out)?;
+                    continue;
+                }
+                Some(_) => {
+                    self.notes.channel(Fate::LeftOut, name, "array");
+                    continue;
+                }
+                None => {}
+            }
+            let made = place(&channel, name.clone(), data_bytes)?;
+            let is_time = made.as_ref().is_ok_and(|made| made.time) || self.is_time(&name);
+            if !is_time && self.reading.only.is_some_and(|is_wanted| !is_wanted(&name)) {
+                self.unread.push(name);
+                continue;
+            }
+            match made {
+                Ok(place) => out.push(place),
+                Err(why) => self.notes.channel(Fate::LeftOut, name, why),
+            }
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn read(file: &[u8], reading: Reading<'_>) -> Result<Recording, RecordingError> {
     if !file.starts_with(b"MDF     ") {
         let what = match file.starts_with(b"UnFinMF") {
             true => "an unfinished MDF file: finalise it first",
@@ -339,6 +515,11 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
     }
     let header = Block::at(bytes, 64)?.expect("##HD")?;
     let mut groups = Vec::new();
+    let mut found = Found {
+        reading,
+        unread: Vec::new(),
+        notes: Notes::default(),
+    };
     let mut blocks = Data {
         bytes,
         seen: HashSet::new(),
@@ -351,13 +532,12 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
             let data = group.data();
             let data_bytes = u64::from(bytes.u32(data + 24)?);
             let mut places = Vec::new();
-            for channel in chain(bytes, group.link(1), "##CN")? {
-                places.extend(place(&channel, data_bytes)?);
-            }
+            found.places(bytes, group.link(1), data_bytes, 0, &mut places)?;
             let made = Open {
                 name: text(bytes, group.link(2))?,
                 size: data_bytes + u64::from(bytes.u32(data + 28)?),
                 varying: bytes.u16(data + 16)? & 1 == 1,
+                count: bytes.u64(data + 8)?,
                 rows: 0,
                 places,
             };
@@ -368,12 +548,19 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
         sort(Bytes(&data), id_size, &mut open, &mut blocks.budget)?;
         let mut made: Vec<(u64, Open)> = open.into_iter().collect();
         made.sort_by_key(|(id, _)| *id);
-        groups.extend(made.into_iter().filter_map(|(_, open)| finished(open)));
+        for (_, open) in made {
+            groups.extend(found.finished(open)?);
+        }
     }
     if groups.is_empty() {
-        return Err("there is no group of channels with a time".into());
+        let aside = found.notes.aside();
+        return Err(format!("there is no group of channels with a time{aside}").into());
     }
-    Ok(Recording { groups })
+    Ok(Recording {
+        groups,
+        unread: found.unread,
+        notes: found.notes,
+    })
 }
 
 /// Every record to its group.
@@ -384,6 +571,31 @@ fn sort(
     budget: &mut Budget,
 ) -> Result<(), RecordingError> {
     let only = open.keys().next().copied().unwrap_or_default();
+    let no_bytes = |group: &Open| {
+        let name = &group.name;
+        Err(RecordingError(format!(
+            "group {name:?}: its records have no bytes"
+        )))
+    };
+    if id_size == 0
+        && let Some(group) = open.get_mut(&only)
+        && !group.varying
+    {
+        if data.0.is_empty() {
+            return Ok(());
+        }
+        if group.size == 0 {
+            return no_bytes(group);
+        }
+        group.rows = data.0.len() as u64 / group.size;
+        let kept = group.rows.min(group.count);
+        budget.take((kept as usize).saturating_mul(group.places.len()))?;
+        let records = data.slice(0, kept * group.size)?;
+        for place in &mut group.places {
+            place.append(records, group.size as usize);
+        }
+        return Ok(());
+    }
     let mut at = 0;
     while at + id_size < data.0.len() as u64 {
         let id = match id_size {
@@ -403,13 +615,15 @@ fn sort(
             continue;
         }
         if group.size == 0 {
-            return Err(format!("group {:?}: its records have no bytes", group.name).into());
+            return no_bytes(group);
         }
         let record = data.slice(at, group.size)?;
-        budget.take(group.places.len())?;
-        for place in &mut group.places {
-            let value = place.value(record, group.rows);
-            place.series.values.push(value);
+        if group.rows < group.count {
+            budget.take(group.places.len())?;
+            for place in &mut group.places {
+                let value = place.value(record, group.rows as usize);
+                place.series.values.push(value);
+            }
         }
         group.rows += 1;
         at += group.size;
@@ -417,16 +631,69 @@ fn sort(
     Ok(())
 }
 
-fn finished(open: Open) -> Option<Group> {
-    let (mut time, channels): (Vec<Place>, Vec<Place>) =
-        open.places.into_iter().partition(|place| place.time);
-    let time = time.pop()?.series;
-    let factor = crate::units::factor(&time.unit, "s").unwrap_or(1.0);
-    Some(Group {
-        name: open.name,
-        time_s: time.values.iter().map(|t| t * factor).collect(),
-        channels: channels.into_iter().map(|place| place.series).collect(),
-    })
+impl Found<'_> {
+    /// A group with its time; none if it has none.
+    fn finished(&mut self, open: Open) -> Result<Option<Group>, RecordingError> {
+        let Open {
+            name,
+            count,
+            rows,
+            mut places,
+            varying,
+            ..
+        } = open;
+        let place = match name.as_str() {
+            "" => "a group without a name".to_owned(),
+            _ => format!("group {name:?}"),
+        };
+        if rows > count {
+            let why = format!("behind the {count} rows that its group has");
+            self.notes
+                .count_many(Fate::LeftOut, Part::Row, &why, rows - count, &place);
+        } else if rows < count && !varying && !places.is_empty() {
+            let why = format!("its group says {count}");
+            self.notes
+                .count_many(Fate::Cut, Part::Row, &why, count - rows, &place);
+        }
+        let named = places.iter().position(|place| self.is_time(&place.series.name));
+        let Some(time) = named.or_else(|| places.iter().position(|place| place.time)) else {
+            for place in places {
+                self.notes
+                    .channel(Fate::LeftOut, place.series.name, "no time in its group");
+            }
+            return Ok(None);
+        };
+        let time = places.remove(time).series;
+        let factor = match (self.reading.time, named) {
+            (Some(term), Some(_)) => term.factor(&time, "s")?,
+            _ if time.unit.is_empty() => 1.0,
+            _ => units::factor(&time.unit, "s").ok_or_else(|| {
+                let (name, unit) = (&time.name, &time.unit);
+                RecordingError(format!(
+                    "{place}: the unit of its time {name}, {unit:?}, is no unit of time"
+                ))
+            })?,
+        };
+        for place in places.extract_if(.., |place| place.time) {
+            let why = "another channel was named as the time";
+            self.notes.channel(Fate::LeftOut, place.series.name, why);
+        }
+        for place in &places {
+            if let Conversion::Ranges { .. } = place.conversion {
+                let texts = place.series.values.iter().filter(|value| value.is_nan()).count();
+                let why = "text in place of a number";
+                let channel = format!("channel {}", place.series.name);
+                self.notes
+                    .count_many(Fate::LeftOut, Part::Value, why, texts as u64, channel);
+            }
+        }
+        Ok(Some(Group {
+            name,
+            time_s: time.values.iter().map(|t| t * factor).collect(),
+            channels: places.into_iter().map(|place| place.series).collect(),
+            ..Group::default()
+        }))
+    }
 }
 
 pub(super) fn write(recording: &Recording) -> Result<Vec<u8>, RecordingError> {

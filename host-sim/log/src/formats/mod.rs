@@ -13,8 +13,9 @@
 //! What holds frames needs a DBC file to become channels. A file that is damaged is refused in one sentence: nothing here
 //! indexes or allocates by what a file says without a look at how much there is. `tests/fuzz_readers/` holds that.
 
-pub mod asc;
-pub mod blf;
+mod asc;
+mod blf;
+mod bus_log;
 mod bytes;
 mod calendar;
 mod csv;
@@ -26,10 +27,14 @@ mod mdf;
 #[cfg(feature = "parquet")]
 mod parquet;
 
+use std::fs::File;
+use std::io::{BufWriter, Read, Write};
 use std::path::Path;
 
-use crate::candump::{self, CandumpFrame};
-use crate::recording::{Group, Recording, RecordingError, Series};
+pub use bus_log::{BusLog, write_frames};
+
+use crate::notes::Notes;
+use crate::recording::{Group, Lines, Recording, RecordingError, Series, Term, refuse};
 use crate::units;
 
 /// A format, by its extension.
@@ -55,12 +60,13 @@ pub enum Format {
 }
 
 /// Extensions and their formats; the first of a format is the usual one.
-const EXTENSIONS: [(&str, Format); 10] = [
+const EXTENSIONS: &[(&str, Format)] = &[
     ("csv", Format::Csv),
     ("parquet", Format::Parquet),
     ("mat", Format::Mat),
     ("mf4", Format::Mdf4),
     ("mdf", Format::Mdf4),
+    #[cfg(feature = "mcap")]
     ("mcap", Format::Mcap),
     ("log", Format::Candump),
     ("candump", Format::Candump),
@@ -78,6 +84,9 @@ impl Format {
         let extension = extension.to_lowercase();
         let found = EXTENSIONS.iter().find(|(known, _)| *known == extension);
         found.map(|(_, format)| *format).ok_or_else(|| {
+            if extension == "mcap" {
+                return NO_MCAP.into();
+            }
             let known: Vec<String> = EXTENSIONS.iter().map(|(known, _)| format!(".{known}")).collect();
             let what = if extension.is_empty() {
                 "no extension".into()
@@ -100,168 +109,264 @@ impl Format {
 }
 
 /// What a file holds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Contents {
     /// Channels.
     Channels(Recording),
-    /// Frames of a bus, in the order of the file.
-    Frames(Vec<CandumpFrame>),
+    /// Frames of a bus, which are read when they are needed.
+    Frames(BusLog),
 }
 
-/// The column that is the time where it has another name than `time_s`, and what makes it seconds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TimeColumn {
-    /// Its name.
-    pub name: String,
-    /// What its values are multiplied by; its own unit decides if none is given.
-    pub scale: Option<f64>,
+impl Contents {
+    /// # Errors
+    /// No value of any channel, with what there is otherwise.
+    fn not_empty(self) -> Result<Self, RecordingError> {
+        if let Self::Channels(recording) = &self {
+            let mut channels = recording.groups.iter().flat_map(|group| &group.channels);
+            if channels.all(|channel| channel.values.iter().all(|value| value.is_nan())) {
+                let aside = recording.notes.aside();
+                return Err(format!("there is no channel with a number in it{aside}").into());
+            }
+        }
+        Ok(self)
+    }
 }
 
-/// Reads the file at `path`.
+/// What is wanted of a file.
+#[derive(Clone, Copy, Default)]
+pub struct Reading<'a> {
+    /// The channel that is the time, if it is not `time_s`; its own unit decides if neither unit nor factor is given.
+    pub time: Option<&'a Term>,
+    /// Whether a channel of this name is wanted; none: all are.
+    pub only: Only<'a>,
+}
+
+/// Which channels are wanted.
+pub type Only<'a> = Option<&'a dyn Fn(&str) -> bool>;
+
+/// What a table holds.
+#[derive(Default)]
+struct Table {
+    columns: Vec<Series>,
+    lines: Lines,
+    unread: Vec<String>,
+    notes: Notes,
+}
+
+/// Reads the file at `path`; `through` may look at what is read, to show how far it is.
 ///
 /// # Errors
 /// What cannot be read, with the file, and the channel where one is the reason.
-pub fn read(path: &Path, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
+pub fn read(
+    path: &Path,
+    reading: Reading<'_>,
+    through: impl FnOnce(File) -> Box<dyn Read>,
+) -> Result<Contents, RecordingError> {
     let format = Format::from_path(path)?;
     let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = std::fs::read(path).map_err(|e| named(e.to_string().into()))?;
-    read_bytes(bytes, format, time).map_err(named)
+    if format.holds_frames() {
+        return Ok(Contents::Frames(BusLog::of_file(path, format).map_err(named)?));
+    }
+    let file = File::open(path).map_err(|e| named(e.to_string().into()))?;
+    read_from(through(file), format, reading).map_err(named)
+}
+
+/// Reads what a source has.
+///
+/// # Errors
+/// As [`read`], without the file's name.
+pub fn read_from(
+    mut source: impl Read,
+    format: Format,
+    reading: Reading<'_>,
+) -> Result<Contents, RecordingError> {
+    if format == Format::Csv {
+        let read = csv::read(source, reading.only).and_then(|table| with_time(table, reading.time));
+        let read = read.map(Contents::Channels).and_then(Contents::not_empty);
+        return read.map_err(RecordingError::printable);
+    }
+    let mut bytes = Vec::new();
+    source.read_to_end(&mut bytes).map_err(refuse)?;
+    read_bytes(bytes, format, reading)
 }
 
 /// Reads a file's bytes.
 ///
 /// # Errors
 /// As [`read`], without the file's name.
-pub fn read_bytes(
-    bytes: Vec<u8>,
-    format: Format,
-    time: Option<&TimeColumn>,
-) -> Result<Contents, RecordingError> {
-    contents(bytes, format, time).map_err(RecordingError::printable)
+pub fn read_bytes(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Contents, RecordingError> {
+    contents(bytes, format, reading)
+        .and_then(Contents::not_empty)
+        .map_err(RecordingError::printable)
 }
 
-fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
-    let text = |bytes: Vec<u8>| {
-        String::from_utf8(bytes).map_err(|e| {
-            let place = e.utf8_error().valid_up_to();
-            RecordingError(format!("byte {place}: this is no text"))
-        })
-    };
+fn contents(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Contents, RecordingError> {
     let table = match format {
-        Format::Candump => return Ok(Contents::Frames(candump::parse(&text(bytes)?)?)),
-        Format::Asc => return Ok(Contents::Frames(asc::parse(&text(bytes)?)?)),
-        Format::Blf => return Ok(Contents::Frames(blf::parse(&bytes)?)),
-        Format::Mdf4 => return Ok(Contents::Channels(mdf::read(&bytes)?.described())),
+        Format::Candump | Format::Asc | Format::Blf => {
+            return Ok(Contents::Frames(BusLog::of_bytes(bytes, format)));
+        }
+        Format::Mdf4 => {
+            return Ok(Contents::Channels(
+                mdf::read(&bytes, reading)?.described().settled()?,
+            ));
+        }
         Format::Mcap => {
             return Err("MCAP is written, not read: convert from what it was made of".into());
         }
-        Format::Csv => csv::read(&bytes)?,
-        Format::Mat => mat::read(&bytes)?,
+        Format::Csv => csv::read(&bytes[..], reading.only)?,
+        Format::Mat => mat::read(&bytes, reading.time)?,
         #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::read(bytes)?,
+        Format::Parquet => parquet::read(bytes, reading.only)?,
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => return Err(NO_PARQUET.to_owned().into()),
     };
-    Ok(Contents::Channels(with_time(table, time)?))
+    Ok(Contents::Channels(with_time(table, reading.time)?))
 }
 
 /// A recording of columns in memory, by their names with or without units in brackets; the time is among them.
 ///
 /// # Errors
 /// No time; columns of different lengths.
-pub fn table(
-    columns: Vec<(String, Vec<f64>)>,
-    time: Option<&TimeColumn>,
-) -> Result<Recording, RecordingError> {
+pub fn table(columns: Vec<(String, Vec<f64>)>, time: Option<&Term>) -> Result<Recording, RecordingError> {
     let (names, values): (Vec<String>, Vec<Vec<f64>>) = columns.into_iter().unzip();
     let columns = csv::headings(&names).into_iter().zip(values);
     let columns = columns.map(|(heading, values)| Series { values, ..heading });
-    with_time(columns.collect(), time)
+    let table = Table {
+        columns: columns.collect(),
+        ..Table::default()
+    };
+    with_time(table, time)
 }
+
+const NO_MCAP: &str = "this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap";
 
 #[cfg(not(feature = "parquet"))]
 const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the command line host-sim does";
 
 /// Columns of a table, the time among them, as a recording.
-fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Recording, RecordingError> {
-    let (wanted, scale) = time.map_or(("time_s", None), |t| (t.name.as_str(), t.scale));
+fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, RecordingError> {
+    let usual = Term {
+        channel: "time_s".into(),
+        factor: None,
+    };
+    let time = time.unwrap_or(&usual);
+    let wanted = time.channel.as_str();
+    let columns = &mut table.columns;
     let exact = columns.iter().position(|c| c.name.eq_ignore_ascii_case(wanted));
     let place = exact.or_else(|| {
         let is_it = |c: &Series| units::bare(&c.name).eq_ignore_ascii_case(units::bare(wanted));
         columns.iter().position(is_it)
     });
+    let is_twice = |place: usize| columns[place + 1..].iter().any(|c| c.name == columns[place].name);
+    if place.is_some_and(is_twice) {
+        return Err(format!("channel {wanted} is there twice").into());
+    }
     let Some(place) = place else {
-        let names: Vec<&str> = columns.iter().take(8).map(|c| c.name.as_str()).collect();
+        let bare = units::bare(wanted);
+        if let Some(error) = table.notes.left_out(bare) {
+            return Err(error);
+        }
+        let names = columns.iter().map(|c| &c.name).chain(&table.unread);
+        let names: Vec<&str> = names.take(8).map(String::as_str).collect();
         return Err(format!(
-            "there is no channel {wanted}; if another one is the time, --map time_s=NAME says so (there are {})",
-            if names.is_empty() { "none".into() } else { names.join(", ") }
+            "there is no channel {wanted}; if another one is the time, --time NAME says so (there are {}){}",
+            if names.is_empty() {
+                "none".into()
+            } else {
+                names.join(", ")
+            },
+            table.notes.aside()
         )
         .into());
     };
-    let time = columns.remove(place);
-    let unit = match (time.unit.as_str(), units::in_brackets(&time.name)) {
-        ("", Some((_, unit))) => unit,
-        ("", None) => units::of_name(&time.name).unwrap_or("s"),
-        (unit, _) => unit,
-    };
-    let factor = scale.or_else(|| units::factor(unit, "s"));
-    let factor =
-        factor.ok_or_else(|| format!("channel {}: its unit {unit:?} is no unit of time", time.name))?;
-    if let Some(other) = columns.iter().find(|c| c.values.len() != time.values.len()) {
-        let (found, rows) = (other.values.len(), time.values.len());
-        return Err(format!(
-            "channel {}: {found} rows where {} has {rows}",
-            other.name, time.name
-        )
-        .into());
+    let mut own = columns.remove(place);
+    if own.unit.is_empty() {
+        let said = units::in_brackets(&own.name).map(|(_, unit)| unit);
+        own.unit = said
+            .or_else(|| units::of_name(&own.name))
+            .unwrap_or_default()
+            .into();
+    }
+    let factor = time.factor(&own, "s")?;
+    let rows = own.values.len();
+    if let Some(other) = columns.iter().find(|c| c.values.len() != rows) {
+        let (name, found) = (&other.name, other.values.len());
+        return Err(format!("channel {name}: {found} rows where {} has {rows}", own.name).into());
     }
     // 1.0 changes no bit.
-    let time_s = time.values.iter().map(|t| t * factor).collect();
-    Ok(Recording::of(Group::new(time_s, columns)).described())
+    let time_s = own.values.into_iter().map(|t| t * factor).collect();
+    let mut group = Group::new(time_s, table.columns);
+    group.lines = table.lines;
+    Recording {
+        groups: vec![group],
+        unread: table.unread,
+        notes: table.notes,
+    }
+    .described()
+    .settled()
 }
 
-/// Writes channels into the file at `path`.
+/// Writes channels into the file at `path`: beside it first, so that a file that is there is replaced by a whole one.
 ///
 /// # Errors
 /// A format of frames, channels that it cannot hold, what the disk says; with the file.
 pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
-    let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::from_path(path)? {
-        Format::Csv => csv::write(&recording.into_one_group().map_err(named)?),
-        Format::Mat => mat::write(&recording.into_one_group().map_err(named)?),
-        Format::Mdf4 => mdf::write(&recording),
+    let format = Format::from_path(path)?;
+    replaced(path, |out| {
+        match format {
+        Format::Csv => csv::write(&recording.into_one_group()?, out),
+        Format::Mat => mat::write(&recording.into_one_group()?, out),
+        Format::Mdf4 => whole(out, mdf::write(&recording)?),
         #[cfg(feature = "mcap")]
-        Format::Mcap => mcap::write(&recording),
+        Format::Mcap => whole(out, mcap::write(&recording)?),
         #[cfg(not(feature = "mcap"))]
-        Format::Mcap => Err("this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap".into()),
+        Format::Mcap => Err(NO_MCAP.into()),
         #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::write(&recording.into_one_group().map_err(named)?),
+        Format::Parquet => parquet::write(&recording.into_one_group()?, out),
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => Err(NO_PARQUET.to_owned().into()),
         Format::Candump | Format::Asc | Format::Blf => Err(
             "a table of channels has no frames, and a bus log nothing else; `host-sim run --bus-log` records the bus".into(),
         ),
-    };
-    std::fs::write(path, bytes.map_err(named)?).map_err(|e| named(e.to_string().into()))
+    }
+    })
 }
 
-/// Writes frames into the file at `path`.
+/// Channels as the text of a CSV file.
 ///
 /// # Errors
-/// A format of channels, what the disk says; with the file.
-pub fn write_frames(path: &Path, frames: &[CandumpFrame]) -> Result<(), RecordingError> {
-    let named = |e: String| RecordingError(format!("{}: {e}", path.display()));
-    let bytes = match Format::from_path(path)? {
-        Format::Candump => {
-            let mut out = Vec::new();
-            for frame in frames {
-                candump::write_frame(&mut out, frame).map_err(|e| named(e.to_string()))?;
-            }
-            out
-        }
-        Format::Asc => asc::write(frames),
-        Format::Blf => blf::write(frames),
-        _ => return Err(named("frames become channels by a DBC file first".into())),
+/// Two channels of one name.
+pub fn to_csv(recording: Recording) -> Result<Vec<u8>, RecordingError> {
+    let mut text = Vec::new();
+    csv::write(&recording.into_one_group()?, &mut text)?;
+    Ok(text)
+}
+
+fn whole(out: &mut Out, bytes: Vec<u8>) -> Result<(), RecordingError> {
+    out.write_all(&bytes).map_err(refuse)
+}
+
+/// A file under way.
+type Out = BufWriter<File>;
+
+/// Puts what `write` writes in the place of the file at `path`; where that fails, the file stays as it is. What a kill leaves
+/// beside it is in nobody's way.
+fn replaced(
+    path: &Path,
+    write: impl FnOnce(&mut Out) -> Result<(), RecordingError>,
+) -> Result<(), RecordingError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let beside = path.with_file_name(format!("{name}.{}.unfinished", std::process::id()));
+    let made = || -> Result<(), RecordingError> {
+        let mut out = BufWriter::new(File::create(&beside).map_err(refuse)?);
+        write(&mut out)?;
+        let file = out.into_inner().map_err(refuse)?;
+        file.sync_all().map_err(refuse)?;
+        std::fs::rename(&beside, path).map_err(refuse)
     };
-    std::fs::write(path, bytes).map_err(|e| named(e.to_string()))
+    made().map_err(|e| {
+        // If it cannot be removed either, the disk has said why.
+        let _ = std::fs::remove_file(&beside);
+        RecordingError(format!("{}: {e}", path.display()))
+    })
 }

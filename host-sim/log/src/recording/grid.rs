@@ -62,23 +62,28 @@ impl Recording {
     }
 
     /// All channels every `1/rate_hz` s, over the time that all cover: values that steps describe (integers) as held, others
-    /// on the line between their neighbours.
+    /// on the line between their neighbours, and none in pauses longer than `longest_s`, if that is given.
     ///
     /// # Errors
     /// No time that all channels cover, instants that do not grow, a clock that was set, more than 30 million values.
-    pub fn resampled(&self, rate_hz: f64) -> Result<Group, RecordingError> {
+    pub fn resampled(&self, rate_hz: f64, longest_s: Option<f64>) -> Result<Group, RecordingError> {
         let whole = |name: &str| {
             let mut all = self.channels().filter(|(_, c)| c.name == name);
             all.all(|(_, c)| c.values.iter().all(|v| v.is_nan() || v.fract() == 0.0))
         };
-        self.on_grid(rate_hz, whole)
+        self.on_grid(rate_hz, longest_s.unwrap_or(f64::INFINITY), whole)
     }
 
     /// As [`Recording::resampled`], with a say in which channels are held.
     ///
     /// # Errors
     /// As there.
-    fn on_grid(&self, rate_hz: f64, held: impl Fn(&str) -> bool) -> Result<Group, RecordingError> {
+    fn on_grid(
+        &self,
+        rate_hz: f64,
+        longest_s: f64,
+        held: impl Fn(&str) -> bool,
+    ) -> Result<Group, RecordingError> {
         self.check_names()?;
         let mut courses = Vec::new();
         for (group, channel) in self.channels() {
@@ -124,7 +129,7 @@ impl Recording {
         let channels = courses
             .into_iter()
             .map(|(channel, t, v)| Series {
-                values: on_grid(&t, &v, &time_s, held(&channel.name)),
+                values: on_grid((&t, &v), &time_s, longest_s, held(&channel.name)),
                 ..channel.clone()
             })
             .collect();
@@ -134,7 +139,7 @@ impl Recording {
 
 /// Values of a course at rising instants: as held, or on the line between neighbours. Instants up to a microsecond before a
 /// value have it already, as clocks round.
-fn on_grid(time_s: &[f64], values: &[f64], at_s: &[f64], held: bool) -> Vec<f64> {
+fn on_grid((time_s, values): (&[f64], &[f64]), at_s: &[f64], longest_s: f64, held: bool) -> Vec<f64> {
     let mut k = 0;
     at_s.iter()
         .map(|&t| {
@@ -142,7 +147,9 @@ fn on_grid(time_s: &[f64], values: &[f64], at_s: &[f64], held: bool) -> Vec<f64>
                 k += 1;
             }
             let next = (k + 1).min(time_s.len() - 1);
-            if held || time_s[next] <= time_s[k] {
+            if t > time_s[k] + 1e-6 && time_s[next] - time_s[k] > longest_s {
+                f64::NAN
+            } else if held || time_s[next] <= time_s[k] {
                 values[k]
             } else {
                 values[k] + (t - time_s[k]) / (time_s[next] - time_s[k]) * (values[next] - values[k])

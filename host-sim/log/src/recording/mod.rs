@@ -5,9 +5,14 @@
 //! the channels mean.
 
 mod grid;
+mod stamps;
+mod term;
 
+use crate::notes::Notes;
 use crate::trace::{CHANNELS, Trace};
 use crate::units;
+pub use stamps::Lines;
+pub use term::Term;
 
 /// A channel of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,6 +36,8 @@ pub struct Group {
     pub time_s: Vec<f64>,
     /// The channels, each with as many values as there are instants.
     pub channels: Vec<Series>,
+    /// Where the rows stand, of a text.
+    pub lines: Lines,
 }
 
 /// Everything that a file holds.
@@ -38,6 +45,10 @@ pub struct Group {
 pub struct Recording {
     /// The groups, in the order of the file.
     pub groups: Vec<Group>,
+    /// Names of channels that nobody asked for, and that were not read.
+    pub unread: Vec<String>,
+    /// What the file holds that the groups do not.
+    pub notes: Notes,
 }
 
 /// Why a recording was refused: one sentence with channel and reason, and the file where one is known.
@@ -104,7 +115,12 @@ impl Group {
     /// Values a second, in the mean over the group's instants.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
-        rate_hz(&self.time_s)
+        let span_s = self
+            .time_s
+            .last()
+            .zip(self.time_s.first())
+            .map_or(0.0, |(b, a)| b - a);
+        rate_hz(self.time_s.len(), span_s)
     }
 
     /// The first instant that is not after the one before it.
@@ -116,10 +132,11 @@ impl Group {
     }
 }
 
-fn rate_hz(time_s: &[f64]) -> f64 {
-    match time_s {
-        [first, .., last] if last > first => (time_s.len() - 1) as f64 / (last - first),
-        _ => 0.0,
+fn rate_hz(samples: usize, span_s: f64) -> f64 {
+    if span_s > 0.0 {
+        (samples - 1) as f64 / span_s
+    } else {
+        0.0
     }
 }
 
@@ -127,8 +144,7 @@ impl Recording {
     /// A recording of one group.
     #[must_use]
     pub fn of(group: Group) -> Self {
-        let groups = vec![group];
-        Self { groups }
+        vec![group].into()
     }
 
     /// Every channel with its group.
@@ -142,13 +158,23 @@ impl Recording {
     #[must_use]
     pub fn table(&self) -> Vec<Line> {
         let line = |(group, channel): (&Group, &Series)| {
-            let (there, _) = channel.present_values(group);
+            let is_there = |k: &usize| !channel.values[*k].is_nan();
+            let mut there = (0..channel.values.len()).filter(is_there);
+            let first = there.next();
+            let ends = first.zip(there.next_back());
+            let samples = there.count() + usize::from(first.is_some()) + usize::from(ends.is_some());
+            let span_s = ends.map_or(0.0, |(first, last)| group.time_s[last] - group.time_s[first]);
+            let many = self.channels().filter(|(_, c)| c.name == channel.name).count() > 1;
             Line {
-                name: channel.name.clone(),
+                name: if many {
+                    format!("{}.{}", group.name, channel.name)
+                } else {
+                    channel.name.clone()
+                },
                 unit: channel.unit.clone(),
                 source: channel.source.clone(),
-                sample_rate_hz: rate_hz(&there),
-                samples: there.len(),
+                sample_rate_hz: rate_hz(samples, span_s),
+                samples,
             }
         };
         self.channels().map(line).collect()
@@ -174,9 +200,19 @@ impl Recording {
                 .filter(|(_, c)| units::bare(&c.name) == name)
                 .collect();
         }
+        if found.is_empty() {
+            let bare = units::bare(name);
+            found = self
+                .channels()
+                .filter(|(_, c)| c.name.eq_ignore_ascii_case(bare))
+                .collect();
+        }
         match found[..] {
             [found] => Ok(found),
-            [] => Err(format!("there is no channel {name}{}", self.near(name)).into()),
+            [] => Err(self
+                .notes
+                .left_out(units::bare(name))
+                .unwrap_or_else(|| format!("there is no channel {name}{}", self.near(name)).into())),
             [(first, a), (second, b), ..] if std::ptr::eq(first, second) => Err(format!(
                 "channel {name} is there twice, as {} and as {}: say which",
                 a.name, b.name
@@ -190,18 +226,94 @@ impl Recording {
         }
     }
 
-    fn near(&self, name: &str) -> String {
+    /// Names that differ from this one in the last part, where units stand, or at least have its first part.
+    #[must_use]
+    pub fn like(&self, name: &str) -> Vec<&str> {
         let lower = name.to_lowercase();
-        let stem = lower.split(['_', '.', ' ']).next().unwrap_or(&lower);
-        let names = self.channels().map(|(_, c)| c.name.as_str());
-        let (near, all): (Vec<&str>, Vec<&str>) = names.partition(|n| n.to_lowercase().contains(stem));
-        let (said, shown) = match (near.is_empty(), all.is_empty()) {
-            (false, _) => ("near are", near),
-            (true, false) => ("there are", all),
-            (true, true) => return "; there is none at all".into(),
+        let (stem, _) = lower.rsplit_once('_').unwrap_or((&lower, ""));
+        let first = lower
+            .split(['_', '.', ' '])
+            .next()
+            .filter(|first| first.len() > 2);
+        let having = |part: &str| -> Vec<&str> {
+            let is_it = |own: &&str| own.to_lowercase().contains(part);
+            self.names().filter(is_it).collect()
         };
+        let like = having(stem);
+        match first {
+            Some(first) if like.is_empty() => having(first),
+            _ => like,
+        }
+    }
+
+    fn names(&self) -> impl Iterator<Item = &str> {
+        let read = self.channels().map(|(_, c)| c.name.as_str());
+        read.chain(self.unread.iter().map(String::as_str))
+    }
+
+    fn near(&self, name: &str) -> String {
+        let like = self.like(name);
+        let (said, shown) = match like.is_empty() {
+            false => ("near are", like),
+            true => ("there are", self.names().collect()),
+        };
+        if shown.is_empty() {
+            return "; there is none at all".into();
+        }
         let dots = if shown.len() > 8 { ", .." } else { "" };
         format!("; {said} {}{dots}", shown[..shown.len().min(8)].join(", "))
+    }
+
+    /// Its channels under other names, each in the unit that its new name ends with, if it ends with one.
+    ///
+    /// # Errors
+    /// No such channel; a unit that does not convert.
+    pub fn renamed(mut self, names: &[(String, Term)]) -> Result<Self, RecordingError> {
+        let mut found = Vec::new();
+        for (name, term) in names {
+            let (_, series) = self.find(&term.channel)?;
+            let unit = units::of_name(name).unwrap_or(&series.unit).to_owned();
+            let factor = term.factor(series, &unit)?;
+            found.push((std::ptr::from_ref(series), name, unit, factor));
+        }
+        for channel in self.groups.iter_mut().flat_map(|group| &mut group.channels) {
+            let own = std::ptr::from_ref::<Series>(channel);
+            if let Some((_, name, unit, factor)) = found.iter().find(|(series, ..)| *series == own) {
+                (channel.name, channel.unit) = ((*name).clone(), unit.clone());
+                for value in channel.values.iter_mut().filter(|_| *factor != 1.0) {
+                    *value *= factor;
+                }
+            }
+        }
+        Ok(self)
+    }
+
+    /// What lies in these stretches, s; all of it if there is none.
+    ///
+    /// # Errors
+    /// Nothing lies in them.
+    pub fn within(mut self, stretches: &[(f64, f64)]) -> Result<Self, RecordingError> {
+        if stretches.is_empty() {
+            return Ok(self);
+        }
+        for group in &mut self.groups {
+            let is_in = |t: &f64| stretches.iter().any(|(from, to)| (*from..=*to).contains(t));
+            let kept: Vec<bool> = group.time_s.iter().map(is_in).collect();
+            let cut = |values: &mut Vec<f64>| {
+                let mut kept = kept.iter();
+                values.retain(|_| kept.next().is_some_and(|kept| *kept));
+            };
+            cut(&mut group.time_s);
+            group
+                .channels
+                .iter_mut()
+                .for_each(|channel| cut(&mut channel.values));
+            group.lines = Lines::default();
+        }
+        if self.groups.iter().all(|group| group.time_s.is_empty()) {
+            return Err("there is no row in the stretches of --from and --to".into());
+        }
+        Ok(self)
     }
 
     /// Says of the product's own channels what a file did not say: unit and source.
@@ -223,6 +335,15 @@ impl Recording {
             }
         }
         self
+    }
+}
+
+impl From<Vec<Group>> for Recording {
+    fn from(groups: Vec<Group>) -> Self {
+        Self {
+            groups,
+            ..Self::default()
+        }
     }
 }
 

@@ -142,14 +142,11 @@ fn refuse_what_is_foreign(directory: &Path, owner: Owner<'_>) -> io::Result<()> 
     }
     // A directory that is not there, or no directory: writing says so.
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-    // What a killed program left of a file that the command keeps is the command's too.
-    let is_of = |keep: &str, name: &str| {
-        let rest = name.strip_prefix(keep);
-        rest.is_some_and(|rest| rest.is_empty() || rest.ends_with(".unfinished"))
-    };
     let is_foreign = |name: &str| {
         name != LIST
-            && !owner.keeps.iter().any(|keep| is_of(keep, name))
+            // What a killed program left of a file is nobody's.
+            && !name.ends_with(".unfinished")
+            && !owner.keeps.contains(&name)
             && !last
                 .as_ref()
                 .is_some_and(|last| last.files.contains(Path::new(name)))

@@ -42,11 +42,15 @@ pub(super) fn parse(
         k_d: arm.k_d.unwrap_or(named.k_d),
         k_hg: arm.k_hg.unwrap_or(named.k_hg),
     };
-    let speed = match (file.speed, file.speed_m_per_s) {
-        (Some(changing), None) => changing,
-        (None, Some(constant)) => Speed::Constant(constant),
-        (None, None) => Speed::constant_kmh(DEFAULT_SPEED_KMH),
-        (Some(_), Some(_)) => return Err(InputError::new(name, "either speed_m_per_s or a table [speed]")),
+    let speed = match (file.speed, file.speed_m_per_s, file.speed_kmh) {
+        (Some(changing), None, None) => changing,
+        (None, Some(constant), None) => Speed::Constant(constant),
+        (None, None, Some(kmh)) => Speed::constant_kmh(kmh),
+        (None, None, None) => Speed::constant_kmh(DEFAULT_SPEED_KMH),
+        _ => {
+            let what = "one of speed_m_per_s, speed_kmh and a table [speed] is wanted";
+            return Err(InputError::new(name, what));
+        }
     };
     Ok(Scenario::builder()
         .course(course)
@@ -106,6 +110,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         lane: None,
         turn: Vec::new(),
         speed_m_per_s: constant,
+        speed_kmh: None,
         speed: constant.is_none().then(|| speed.clone()),
         condition: match scenario.condition() {
             // The gains say the rest.
@@ -164,6 +169,7 @@ pub fn fields_of(table: &str) -> Vec<&'static Field> {
 pub fn unit_of(path: &str) -> Option<&'static str> {
     match path.split('.').collect::<Vec<_>>()[..] {
         ["speed_m_per_s"] => Some("m/s"),
+        ["speed_kmh"] => Some("km/h"),
         [table, name] | ["course", table @ "segment", _, name] => {
             let field = fields_of(table).into_iter().find(|field| field.name == name)?;
             matches!(field.range, Range::Between(..)).then_some(field.unit)
@@ -247,6 +253,8 @@ struct ScenarioFile {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     turn: Vec<String>,
     speed_m_per_s: Option<f64>,
+    #[serde(skip_serializing)]
+    speed_kmh: Option<f64>,
     speed: Option<Speed>,
     condition: Condition,
     sensors: Sensors,
@@ -272,6 +280,7 @@ impl Default for ScenarioFile {
             lane: None,
             turn: Vec::new(),
             speed_m_per_s: None,
+            speed_kmh: None,
             speed: None,
             condition: Condition::Mid,
             sensors: Sensors::default(),

@@ -24,11 +24,7 @@ const PLACES_M: RangeInclusive<f64> = 0.0..=1e6;
 
 /// Speed as a scenario says it, not yet checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(
-    untagged,
-    deny_unknown_fields,
-    expecting = "expected a table [speed] with either `time_s` or `place_m` and `speed_m_per_s`, each a list of numbers"
-)]
+#[serde(untagged, try_from = "InFile")]
 pub enum Speed {
     /// The same all the time, m/s. In a file it is a number at the top.
     #[serde(skip)]
@@ -49,6 +45,42 @@ pub enum Speed {
     },
 }
 
+/// A table [speed].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InFile {
+    time_s: Option<Vec<f64>>,
+    place_m: Option<Vec<f64>>,
+    speed_m_per_s: Option<Vec<f64>>,
+    speed_kmh: Option<Vec<f64>>,
+}
+
+impl TryFrom<InFile> for Speed {
+    type Error = &'static str;
+
+    fn try_from(file: InFile) -> Result<Self, Self::Error> {
+        let of_kmh = |kmh: Vec<f64>| kmh.iter().map(|kmh| kmh / 3.6).collect();
+        let wanted = "expected a table [speed] with either `time_s` or `place_m` and either `speed_m_per_s` or \
+                      `speed_kmh`, each a list of numbers";
+        let speed_m_per_s = match (file.speed_m_per_s, file.speed_kmh) {
+            (Some(m_per_s), None) => m_per_s,
+            (None, Some(kmh)) => of_kmh(kmh),
+            _ => return Err(wanted),
+        };
+        match (file.time_s, file.place_m) {
+            (Some(time_s), None) => Ok(Self::ByTime {
+                time_s,
+                speed_m_per_s,
+            }),
+            (None, Some(place_m)) => Ok(Self::ByPlace {
+                place_m,
+                speed_m_per_s,
+            }),
+            _ => Err(wanted),
+        }
+    }
+}
+
 /// A speed in km/h, for people to read: the number of km/h that it was made of, if it was.
 fn kmh(m_per_s: f64) -> f64 {
     (3.6e9 * m_per_s).round() / 1e9
@@ -66,6 +98,17 @@ impl Speed {
         Self::ByTime {
             time_s,
             speed_m_per_s,
+        }
+    }
+
+    /// The largest, m/s.
+    #[must_use]
+    pub fn fastest_m_per_s(&self) -> f64 {
+        match self {
+            Self::Constant(m_per_s) => *m_per_s,
+            Self::ByTime { speed_m_per_s, .. } | Self::ByPlace { speed_m_per_s, .. } => {
+                speed_m_per_s.iter().copied().fold(0.0, f64::max)
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! `host-sim ecu live`: a bus as it comes, or as it was recorded.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -9,9 +9,12 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use haptic_core::bus::Frame;
+use haptic_core::bus::messages::MESSAGES;
+use haptic_log::bus::Form;
 use haptic_log::candump;
+use haptic_log::notes::Notes;
 use haptic_pil::PilError;
-use haptic_pil::live::{Counts, Listener, Status, View};
+use haptic_pil::live::{Counts, Listener, Status, Unread, View};
 use serde_json::json;
 
 use super::super::{BadInput, Outcome, in_file, print};
@@ -26,6 +29,9 @@ pub(in crate::cli) struct Arguments {
     /// In place of a bus, what --record or `candump -L` wrote of one
     #[arg(long, value_name = "FILE", group = "source")]
     log: Option<PathBuf>,
+    /// The bus of a log of several, by its interface (can0)
+    #[arg(long, value_name = "NAME", requires = "log")]
+    bus: Option<String>,
     /// Write every frame to this file as it comes, in the form of `candump -L`; a file that is there is not overwritten
     #[arg(long, value_name = "FILE", conflicts_with = "log")]
     record: Option<PathBuf>,
@@ -35,7 +41,7 @@ pub(in crate::cli) struct Arguments {
     /// End after so many seconds, 0.01 to 1e9; otherwise Ctrl-C ends it
     #[arg(long, value_name = "SECONDS", value_parser = duration)]
     r#for: Option<f64>,
-    /// Print one JSON object a line: {"status": ..}, {"change": ..} and, last, {"counts": ..}
+    /// Print one JSON object a line: {"status": ..}, {"change": ..} and, last, {"counts": .., "unread": .., "notes": ..}
     #[arg(long)]
     json: bool,
 }
@@ -65,6 +71,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         until_s: arguments.r#for.unwrap_or(f64::INFINITY),
         next_s: arguments.every,
         json: arguments.json,
+        bus: arguments.bus.clone(),
+        unread: Unread::default(),
+        notes: Notes::default(),
     };
     screen.print_heading()?;
     let end = match (&arguments.log, &arguments.can) {
@@ -83,9 +92,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     screen.print_status()?;
     let counts = screen.view.counts();
     if screen.json {
-        print(&json!({ "counts": counts }).to_string())?;
+        let last = json!({ "counts": counts, "unread": screen.unread, "notes": screen.notes });
+        print(&last.to_string())?;
     } else {
-        print(&summary(counts))?;
+        print(&summary(counts, &screen.unread, &screen.notes))?;
     }
     let heard = counts.frames.contains_key("Guidance");
     if !heard {
@@ -121,18 +131,39 @@ struct Screen {
     /// When the next line of status is due.
     next_s: f64,
     json: bool,
+    bus: Option<String>,
+    /// What an adapter wrote that is no frame.
+    unread: Unread,
+    /// What a log holds that is no frame.
+    notes: Notes,
 }
 
 impl Screen {
     fn play(&mut self, path: &Path) -> Result<(), End> {
-        let text = std::fs::read_to_string(path).map_err(in_file(path))?;
-        for recorded in candump::parse(&text).map_err(in_file(path))? {
-            // A longer identifier is of another bus.
-            let id = u16::try_from(recorded.id).ok();
-            if let Some(frame) = id.and_then(|id| Frame::new(id, &recorded.data)) {
-                self.show(recorded.time_s, &frame)?;
+        let mut own_bus: Option<String> = None;
+        let mut input = BufReader::new(File::open(path).map_err(in_file(path))?);
+        let bus = self.bus.clone();
+        self.notes = candump::read(&mut input, bus.as_deref(), &mut |recorded| {
+            // This bus is of classic CAN with 11 bits: what is otherwise is of another one.
+            let is_other = recorded.extended || recorded.form != Form::Classic;
+            let id = u16::try_from(recorded.id).ok().filter(|_| !is_other);
+            let Some(frame) = id.and_then(|id| Frame::new(id, &recorded.data)) else {
+                self.view.take_foreign();
+                return Ok(());
+            };
+            if let Some(info) = MESSAGES.iter().find(|info| info.id == frame.id()) {
+                let own = own_bus.get_or_insert_with(|| recorded.bus.clone());
+                if *own != recorded.bus {
+                    let (name, other) = (info.name, &recorded.bus);
+                    return Err(format!(
+                        "{name} and others are on the buses {own} and {other}: say with --bus which is meant"
+                    )
+                    .into());
+                }
             }
-        }
+            self.show(recorded.time_s, &frame).map_err(|error| error.0.into())
+        })
+        .map_err(in_file(path))?;
         Ok(())
     }
 
@@ -144,7 +175,10 @@ impl Screen {
         let epoch_s = epoch.unwrap_or_default().as_secs_f64();
         let mut flush_s = self.every_s;
         while !ENDED.load(Ordering::Relaxed) && start.elapsed().as_secs_f64() < self.until_s {
-            let frame = listener.frame().map_err(End::Lost)?;
+            let frame = listener.frame().map_err(|error| {
+                self.unread = listener.unread();
+                End::Lost(error)
+            })?;
             let time_s = epoch_s + start.elapsed().as_secs_f64();
             if let Some(frame) = &frame {
                 if let Some((file, path)) = &mut record {
@@ -163,6 +197,7 @@ impl Screen {
                 file.flush().map_err(in_file(path))?;
             }
         }
+        self.unread = listener.unread();
         if let Some((mut file, path)) = record {
             file.flush().map_err(in_file(&path))?;
         }
@@ -260,13 +295,25 @@ fn line(cells: [String; 9], faults: &str) -> String {
     line.trim_end().to_owned()
 }
 
-fn summary(counts: &Counts) -> String {
+fn summary(counts: &Counts, unread: &Unread, notes: &Notes) -> String {
     let mut text = String::from("\nframes:\n");
     for (name, count) in &counts.frames {
         text += &format!("  {name:<16} {count}\n");
     }
-    text + &format!(
+    text += &format!(
         "damaged: {}, lost by their counters: {}, of another bus: {}",
-        counts.damaged, counts.lost, counts.foreign
-    )
+        counts.damaged,
+        counts.lost,
+        counts.foreign + unread.frames
+    );
+    if let Some(first) = &unread.first_line {
+        text += &format!(
+            "\nlines of the adapter that are no frame: {}, the first \"{first}\"",
+            unread.lines
+        );
+    }
+    for note in notes.iter() {
+        text += &format!("\nnote: {note}");
+    }
+    text
 }

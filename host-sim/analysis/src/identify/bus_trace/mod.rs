@@ -1,4 +1,5 @@
-//! A drive recorded on the bus: the text of `candump`, with the DBC file that says what the frames mean.
+//! A drive recorded on the bus: a log of frames, with the DBC file that says what they mean. It is read once, frame by frame;
+//! kept are the signals that are needed.
 //!
 //! Needed are the lane preview (e_y at the near point that driver and guidance share, e_theta at the guidance's far
 //! point), the column (driver torque, wheel angle), the torque of the guidance unless the drive is a manual one, and the
@@ -11,19 +12,18 @@
 //! it is where the vehicle is slower than its model goes.
 
 mod far_point;
+mod heard;
 mod protection;
 
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use can_dbc::Dbc;
-
 use super::log::jumps::jump;
 use super::log::{DriveLog, LogError, refuse};
 pub use far_point::SingleTrack;
-use haptic_log::candump::{self, CandumpFrame};
-use haptic_log::formats::dbc::{identifier, raw};
-use protection::{Audit, audited};
+use haptic_log::formats::{BusLog, dbc};
+use haptic_log::notes::Note;
+use heard::Heard;
 
 /// The product's own bus: core/haptic.dbc.
 pub const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
@@ -55,6 +55,8 @@ pub struct Recording<'a> {
     pub dbc: Option<&'a Path>,
     /// The vehicle, if not that of table 9.
     pub vehicle: Option<SingleTrack>,
+    /// The bus that a log of several is read of, by its name there.
+    pub bus: Option<&'a str>,
     /// Without guidance.
     pub manual: bool,
     /// The stretches that will be used, s of the log's time; all of it if there is none. They choose a side where the clock
@@ -62,59 +64,9 @@ pub struct Recording<'a> {
     pub stretches: &'a [(f64, f64)],
 }
 
-/// Reads the log at `path`, a CSV file or a trace of `candump`; `dbc` says what the trace's frames mean, if it is not
-/// the product's own file. The sentence, if any, says what was computed.
-///
-/// # Errors
-/// As [`DriveLog::open`], for a trace too: what is missing, with the line where there is one.
-pub fn open_recording(
-    path: &Path,
-    dbc: Option<&Path>,
-    manual: bool,
-) -> Result<(DriveLog, Option<&'static str>), LogError> {
-    let how = Recording {
-        dbc,
-        manual,
-        ..Recording::default()
-    };
-    open_recording_with(path, &how)
-}
-
-/// The same of a vehicle that is not that of table 9.
-///
-/// # Errors
-/// As [`open_recording`].
-pub fn open_recording_with(
-    path: &Path,
-    recording: &Recording<'_>,
-) -> Result<(DriveLog, Option<&'static str>), LogError> {
-    let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
-    of_text(&bytes, recording).map_err(|e| LogError::in_file(path.display(), e))
-}
-
-/// A log of the text of either kind, and the sentence about it.
-pub(super) fn of_text(
-    bytes: &[u8],
-    recording: &Recording<'_>,
-) -> Result<(DriveLog, Option<&'static str>), LogError> {
-    let text = std::str::from_utf8(bytes)
-        .ok()
-        .filter(|t| candump::looks_like_one(t));
-    let Some(text) = text else {
-        let log = DriveLog::read_within(bytes, recording.manual, recording.stretches);
-        return Ok((log?, None));
-    };
-    let (log, note) = of_frames(&candump::parse(text)?, recording)?;
-    Ok((log, Some(note)))
-}
-
-/// A log of frames that were read already, and the sentence about it.
-pub(super) fn of_frames(
-    records: &[CandumpFrame],
-    recording: &Recording<'_>,
-) -> Result<(DriveLog, &'static str), LogError> {
-    let dbc = dbc_text(recording.dbc)?;
-    let log = read_trace(records, &dbc, recording)?;
+/// A log of frames, and the sentence about it.
+pub(super) fn of_bus(log: BusLog, recording: &Recording<'_>) -> Result<(DriveLog, &'static str), LogError> {
+    let log = read_trace(&log.of_bus(recording.bus), recording)?;
     let note = if recording.vehicle.is_some() {
         NOTE_OF_OTHER
     } else {
@@ -123,18 +75,19 @@ pub(super) fn of_frames(
     Ok((log, note))
 }
 
-/// The DBC file's text, or that of the product's own.
-pub(super) fn dbc_text(dbc: Option<&Path>) -> Result<String, LogError> {
+/// The DBC file, or that of the product's own.
+pub(super) fn dbc_file(dbc: Option<&Path>) -> Result<Vec<u8>, LogError> {
     let Some(dbc) = dbc else {
-        return Ok(HAPTIC_DBC.to_owned());
+        return Ok(HAPTIC_DBC.into());
     };
-    std::fs::read_to_string(dbc).map_err(|e| LogError::in_file(dbc.display(), e))
+    std::fs::read(dbc).map_err(|e| LogError::in_file(dbc.display(), e))
 }
 
 /// A signal over time.
+#[derive(Default)]
 struct Course {
     name: &'static str,
-    line: Vec<usize>,
+    line: Vec<u32>,
     time_s: Vec<f64>,
     value: Vec<f64>,
 }
@@ -142,25 +95,31 @@ struct Course {
 /// Place of T_h among the signals that a log needs: behind e_y, e_theta, T_d and the wheel angle.
 const GUIDANCE: usize = 4;
 
-fn read_trace(records: &[CandumpFrame], dbc: &str, how: &Recording<'_>) -> Result<DriveLog, LogError> {
-    let dbc = Dbc::try_from(dbc).map_err(|e| format!("the DBC file is not understood: {e}"))?;
-    let mut audits: Vec<Audit> = Vec::new();
-    let mut course = |name| Course::from_frames(name, &dbc, records, &mut audits);
+/// The signals that a log needs. The torque of the guidance is not among those of a manual drive.
+const NEEDED: [&str; 8] = [
+    "LanePreview_LateralError",
+    "LanePreview_YawError",
+    "LanePreview_Valid",
+    "LanePreview_Age",
+    "Column_DriverTorque",
+    "Column_WheelAngle",
+    "Vehicle_Speed1",
+    "Guidance_Torque",
+];
 
-    let mut e_y = course("LanePreview_LateralError")?;
-    let mut e_theta = course("LanePreview_YawError")?;
-    let valid = course("LanePreview_Valid")?;
-    let age = course("LanePreview_Age")?;
-    let [torque, angle] = [course("Column_DriverTorque")?, course("Column_WheelAngle")?];
-    let guidance = if how.manual {
-        None
-    } else {
-        Some(course("Guidance_Torque")?)
-    };
-    let speed = course("Vehicle_Speed1")?;
-    let mut findings: Vec<[String; 3]> = audits.iter().filter_map(Audit::finding).collect();
+fn read_trace(bus: &BusLog, how: &Recording<'_>) -> Result<DriveLog, LogError> {
+    let (dbc, mut notes) = dbc::parse(&dbc_file(how.dbc)?)?;
+    let needed = &NEEDED[..if how.manual { 7 } else { 8 }];
+    let mut heard = Heard::of(needed, &dbc)?;
+    notes.append(bus.each(&mut |frame| heard.take(frame).map_err(|e| e.to_string().into()))?);
+    let mut findings: Vec<[String; 3]> = notes.iter().map(Note::finding).collect();
+    findings.extend(heard.findings());
+    let mut courses = heard.courses()?.into_iter();
+    let mut next = || courses.next().unwrap_or_default();
+    let [e_y, e_theta, valid, age, torque, angle, speed] = [(); 7].map(|()| next());
+    let guidance = courses.next();
     findings.extend(valid.not_valid());
-    [e_y, e_theta] = [e_y, e_theta].map(|c| c.earlier_by(&age).only(&valid));
+    let [e_y, e_theta] = [e_y, e_theta].map(|c| c.earlier_by(&age).only(&valid));
 
     let mut needed: Vec<Course> = [e_y, e_theta, torque, angle]
         .into_iter()
@@ -232,10 +191,10 @@ fn begin(courses: &[Course]) -> Result<f64, LogError> {
 /// From when to when the signals are used: to a jump of the clock, or from it on.
 fn used(courses: &[Course], zero_s: f64, stretches: &[(f64, f64)]) -> Result<RangeInclusive<f64>, LogError> {
     let of =
-        |c: &Course| -> Vec<(f64, usize)> { c.time_s.iter().copied().zip(c.line.iter().copied()).collect() };
-    let mut frames: Vec<(f64, usize)> = courses.iter().flat_map(of).collect();
+        |c: &Course| -> Vec<(f64, u32)> { c.time_s.iter().copied().zip(c.line.iter().copied()).collect() };
+    let mut frames: Vec<(f64, u32)> = courses.iter().flat_map(of).collect();
     frames.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut time_s, lines): (Vec<f64>, Vec<usize>) = frames.into_iter().unzip();
+    let (mut time_s, lines): (Vec<f64>, Vec<u32>) = frames.into_iter().unzip();
     let mut first = 0;
     while let Some(jump) = jump(&time_s[first..], 1.0 / RATE_HZ) {
         let next = first + jump.row + 1;
@@ -250,67 +209,6 @@ fn used(courses: &[Course], zero_s: f64, stretches: &[(f64, f64)]) -> Result<Ran
 }
 
 impl Course {
-    /// The signal in SI units, from all frames that carry it.
-    fn from_frames(
-        name: &'static str,
-        dbc: &Dbc,
-        records: &[CandumpFrame],
-        audits: &mut Vec<Audit>,
-    ) -> Result<Self, LogError> {
-        let found = dbc
-            .messages
-            .iter()
-            .find_map(|m| Some((m, m.signals.iter().find(|s| s.name == name)?)));
-        let Some((message, signal)) = found else {
-            return refuse(format!("the DBC file has no signal {name}"));
-        };
-        let unit = match signal.unit.as_str() {
-            "deg" => std::f64::consts::PI / 180.0,
-            "ms" => 1e-3,
-            _ => 1.0,
-        };
-        let (id, _) = identifier(message.id);
-        let mut course = Self {
-            name,
-            line: Vec::new(),
-            time_s: Vec::new(),
-            value: Vec::new(),
-        };
-        let of_id = records.iter().filter(|r| r.id == id);
-        let (good, audit) = audited(dbc, message.id, &message.name, of_id);
-        let seen = audit.frames;
-        if audits.iter().all(|a| a.name != audit.name) {
-            audits.push(audit);
-        }
-        for record in good {
-            let raw = raw(signal, &record.data).ok_or_else(|| {
-                format!(
-                    "line {}: frame {id:03X} has {} bytes, too few for {name}",
-                    record.line,
-                    record.data.len()
-                )
-            })?;
-            if course.time_s.last().is_some_and(|&last| record.time_s < last) {
-                return refuse(format!("line {}: the time goes back", record.line));
-            }
-            course.line.push(record.line);
-            course.time_s.push(record.time_s);
-            course
-                .value
-                .push((raw as f64 * signal.factor + signal.offset) * unit);
-        }
-        if course.value.len() < 2 {
-            return refuse(match seen {
-                0 | 1 => format!("no frame {id:03X} ({}), so no {name}", message.name),
-                _ => format!(
-                    "none of {seen} frames {id:03X} ({}) has a right CRC, so no {name}",
-                    message.name
-                ),
-            });
-        }
-        Ok(course)
-    }
-
     fn last_s(&self) -> f64 {
         self.time_s[self.time_s.len() - 1]
     }

@@ -4,38 +4,85 @@
 //! The DBC's attributes are those of `core/haptic.dbc`: `E2EDataIds`, sixteen bytes in hexadecimal. Without them
 //! nothing is checked, and the preflight says so.
 
-use can_dbc::{AttributeValue, Dbc, MessageId};
+use can_dbc::{AttributeValue, Dbc, Message, MessageId};
 use crc::{CRC_8_AUTOSAR, Crc};
-use haptic_log::candump::CandumpFrame;
+use haptic_log::bus::BusFrame;
 
 static CRC: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
 
-/// What became of one message's frames.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Audit {
-    pub name: String,
-    pub frames: usize,
-    pub wrong_crc: usize,
-    pub repeated: usize,
-    pub lost: usize,
-    pub checked: bool,
+/// A repeater between two buses sends the very same frame again, at once, s.
+const AT_ONCE_S: f64 = 1e-3;
+
+/// Tells which of a message's frames can be used, and counts the others.
+pub(super) struct Auditor {
+    name: String,
+    /// The data IDs; without them nothing is checked.
+    list: Option<[u8; 16]>,
+    frames: usize,
+    wrong_crc: usize,
+    repeated: usize,
+    last_s: f64,
+    last: Vec<u8>,
+    /// Of the frames that are used.
+    counters: Vec<u8>,
 }
 
-impl Audit {
-    /// In words: what, found, done; nothing for a message without fault.
-    pub(super) fn finding(&self) -> Option<[String; 3]> {
+impl Auditor {
+    /// Of the frames of a message.
+    pub(super) fn of(dbc: &Dbc, message: &Message) -> Self {
+        Self {
+            name: message.name.clone(),
+            list: data_ids(dbc, message.id),
+            frames: 0,
+            wrong_crc: 0,
+            repeated: 0,
+            last_s: f64::NEG_INFINITY,
+            last: Vec::new(),
+            counters: Vec::new(),
+        }
+    }
+
+    /// How many frames came.
+    pub(super) const fn frames(&self) -> usize {
+        self.frames
+    }
+
+    /// Whether the next frame can be used.
+    pub(super) fn takes(&mut self, frame: &BusFrame) -> bool {
+        self.frames += 1;
+        let Some(list) = &self.list else {
+            return true;
+        };
+        let is_intact = matches!(frame.data[..], [crc, b1, b2, b3, b4, b5, b6, b7]
+            if crc == CRC.checksum(&[b1, b2, b3, b4, b5, b6, b7, list[usize::from(b1 & 15)]]));
+        if !is_intact {
+            self.wrong_crc += 1;
+            return false;
+        }
+        if self.last == frame.data && frame.time_s - self.last_s < AT_ONCE_S {
+            self.repeated += 1;
+            return false;
+        }
+        self.last_s = frame.time_s;
+        self.last.clone_from(&frame.data);
+        self.counters.push(frame.data[1] & 15);
+        true
+    }
+
+    /// In words: what, found, done; nothing for a message without fault. The times are those of the frames that are used.
+    pub(super) fn finding(&self, time_s: &[f64]) -> Option<[String; 3]> {
         let Self {
             name,
             frames,
             wrong_crc,
             repeated,
-            lost,
-            checked,
+            ..
         } = self;
-        if !checked {
+        if self.list.is_none() {
             let found = format!("{frames} frames without known protection");
             return Some([name.clone(), found, "used unchecked".to_owned()]);
         }
+        let lost = lost(time_s, &self.counters);
         (wrong_crc + repeated + lost > 0).then(|| {
             [
                 name.clone(),
@@ -44,46 +91,6 @@ impl Audit {
             ]
         })
     }
-}
-
-/// The frames of the message that can be used, and what became of the others.
-pub(super) fn audited<'a>(
-    dbc: &Dbc,
-    id: MessageId,
-    name: &str,
-    frames: impl Iterator<Item = &'a CandumpFrame>,
-) -> (Vec<&'a CandumpFrame>, Audit) {
-    let list = data_ids(dbc, id);
-    let mut audit = Audit {
-        name: name.to_owned(),
-        checked: list.is_some(),
-        ..Audit::default()
-    };
-    let mut good: Vec<&CandumpFrame> = Vec::new();
-    for frame in frames {
-        audit.frames += 1;
-        if let Some(list) = &list {
-            let intact = matches!(frame.data[..], [crc, b1, b2, b3, b4, b5, b6, b7]
-                if crc == CRC.checksum(&[b1, b2, b3, b4, b5, b6, b7, list[usize::from(b1 & 15)]]));
-            if !intact {
-                audit.wrong_crc += 1;
-                continue;
-            }
-            // A repeater between two buses sends the very same frame again, at once.
-            if good
-                .last()
-                .is_some_and(|last| last.data == frame.data && frame.time_s - last.time_s < 1e-3)
-            {
-                audit.repeated += 1;
-                continue;
-            }
-        }
-        good.push(frame);
-    }
-    if list.is_some() {
-        audit.lost = lost(&good);
-    }
-    (good, audit)
 }
 
 fn data_ids(dbc: &Dbc, id: MessageId) -> Option<[u8; 16]> {
@@ -102,18 +109,18 @@ fn data_ids(dbc: &Dbc, id: MessageId) -> Option<[u8; 16]> {
 }
 
 /// Frames that are not there: the counter says how many modulo 16, the time says how often it went round.
-fn lost(frames: &[&CandumpFrame]) -> usize {
-    let mut steps: Vec<f64> = frames.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
+fn lost(time_s: &[f64], counters: &[u8]) -> usize {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).collect();
     if steps.is_empty() {
         return 0;
     }
     let middle = steps.len() / 2;
     let (_, &mut period, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let sum: f64 = frames
-        .windows(2)
-        .map(|w| {
-            let counted = f64::from((w[1].data[1].wrapping_sub(w[0].data[1])) & 15);
-            let by_time = (w[1].time_s - w[0].time_s) / period.max(1e-6);
+    let pairs = time_s.windows(2).zip(counters.windows(2));
+    let sum: f64 = pairs
+        .map(|(t, n)| {
+            let counted = f64::from(n[1].wrapping_sub(n[0]) & 15);
+            let by_time = (t[1] - t[0]) / period.max(1e-6);
             let rounds = ((by_time - counted) / 16.0).round().max(0.0);
             (counted + 16.0 * rounds - 1.0).max(0.0)
         })

@@ -4,6 +4,8 @@
 //! uneven ones, whose signals are read off at the grid's instants between their own. What is missing stays missing
 //! here (no number): the preflight bridges it or cuts the drive there.
 
+use haptic_log::recording::Lines;
+
 use super::super::signals::SWITCH_RATE_NM_S;
 use super::{GUIDANCE_COLUMN, LogError, SHORTEST_S, refuse, too_short};
 
@@ -251,15 +253,15 @@ impl Weights {
 ///
 /// # Errors
 /// Time that does not grow, in another unit, of too few rows.
-pub(super) fn usual_step(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
+pub(super) fn usual_step(time: &[f64], lines: &Lines) -> Result<f64, LogError> {
     if time.len() < 3 {
         return refuse(format!("the log has {} rows, which is too few", time.len()));
     }
     let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     if let Some(k) = steps.iter().position(|&d| d.is_nan() || d <= 0.0) {
         return refuse(format!(
-            "line {}: time_s goes from {} to {}: it must grow",
-            lines[k + 1],
+            "{}: time_s goes from {} to {}: it must grow",
+            lines.place(k + 1),
             time[k],
             time[k + 1]
         ));
@@ -269,8 +271,8 @@ pub(super) fn usual_step(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
     let (low, high) = SAMPLE_PERIOD_RANGE_S;
     if !(low..=high).contains(&usual) {
         return refuse(format!(
-            "line {}: the step of time_s is {usual}, outside {low} to {high} s: is it in ms?",
-            lines[1]
+            "{}: the step of time_s is {usual}, outside {low} to {high} s: is it in ms?",
+            lines.place(1)
         ));
     }
     Ok(usual)

@@ -6,6 +6,8 @@
 
 use std::ops::Range;
 
+use haptic_log::recording::Lines;
+
 use super::{LogError, refuse};
 
 /// Rows that the gaps of a log may leave empty, all together: 2.3 hours at 120 Hz.
@@ -68,14 +70,14 @@ impl Jump {
 /// As [`Jump::use_after`]; the place is the line of the row after the jump.
 pub(super) fn usable(
     time_s: &[f64],
-    lines: &[u64],
+    lines: &Lines,
     step_s: f64,
     stretches: &[(f64, f64)],
 ) -> Result<Range<usize>, LogError> {
     let mut rows = 0..time_s.len();
     while let Some(jump) = jump(&time_s[rows.clone()], step_s) {
         let next = rows.start + jump.row + 1;
-        if jump.use_after(&format!("line {}", lines[next]), 0.0, stretches)? {
+        if jump.use_after(&lines.place(next), 0.0, stretches)? {
             rows.start = next;
         } else {
             rows.end = next;

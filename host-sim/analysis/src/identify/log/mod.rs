@@ -20,8 +20,10 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use grid::{Grid, usual_step};
-use haptic_log::recording::RecordingError;
-use haptic_log::table::{TableError, TableReader, number};
+use haptic_log::recording::{Lines, RecordingError};
+
+use super::bus_trace;
+use super::recording::of_csv;
 
 /// Names of the columns that a log must have, in the order of the fields of [`DriveLog`].
 pub const COLUMNS: [&str; 6] = [
@@ -92,12 +94,6 @@ const ONE_SPEED: f64 = 1.06;
 #[error("{0}")]
 pub struct LogError(String);
 
-impl From<TableError> for LogError {
-    fn from(error: TableError) -> Self {
-        Self(error.to_string())
-    }
-}
-
 impl From<RecordingError> for LogError {
     fn from(error: RecordingError) -> Self {
         Self(error.to_string())
@@ -114,14 +110,6 @@ impl LogError {
     /// Of a file, an option or a channel, which the text then begins with.
     pub(crate) fn in_file(name: impl fmt::Display, error: impl fmt::Display) -> Self {
         Self(format!("{name}: {error}"))
-    }
-
-    /// Of a file without lines: counted are the rows.
-    fn in_a_row(self) -> Self {
-        Self(match self.0.strip_prefix("line ") {
-            Some(rest) => format!("row {rest}"),
-            None => self.0,
-        })
     }
 }
 
@@ -216,34 +204,12 @@ impl DriveLog {
     /// # Errors
     /// As [`DriveLog::read`].
     pub fn read_within(source: impl Read, manual: bool, stretches: &[(f64, f64)]) -> Result<Self, LogError> {
-        let mut table = TableReader::new(source)?;
-        let index = find_columns(table.header(), table.header_line(), manual)?;
-        let speed = table
-            .header()
-            .iter()
-            .position(|name| name.eq_ignore_ascii_case(SPEED_COLUMN));
-        let mut speeds = Vec::new();
-        let mut lines = Vec::new();
-        let mut columns: [Vec<f64>; 6] = Default::default();
-        for row in table.rows() {
-            let row = row?;
-            // Not needed: what is no number tells nothing.
-            speeds.extend(speed.and_then(|i| row.field(i).parse::<f64>().ok()));
-            lines.push(row.line);
-            for (c, column) in columns.iter_mut().enumerate() {
-                column.push(match index[c] {
-                    // Not used, but if it is there, it shows whether the drive was a manual one.
-                    Some(i) if manual && c == GUIDANCE_COLUMN => {
-                        field(row.field(i), row.line, c).unwrap_or_default()
-                    }
-                    Some(i) => field(row.field(i), row.line, c)?,
-                    None => 0.0,
-                });
-            }
-        }
-        let mut log = Self::from_table(&lines, columns, manual, stretches)?;
-        log.tell_speed(&speeds);
-        Ok(log)
+        let how = bus_trace::Recording {
+            manual,
+            stretches,
+            ..bus_trace::Recording::default()
+        };
+        Ok(of_csv(source, &[], &how)?.0)
     }
 
     /// Keeps what the record says of the speed.
@@ -274,13 +240,13 @@ impl DriveLog {
     /// # Errors
     /// As [`DriveLog::read`]; columns of different lengths.
     pub fn from_columns(columns: [Vec<f64>; 6], manual: bool) -> Result<Self, LogError> {
-        Self::from_columns_within(columns, manual, &[])
+        Self::from_columns_within(columns, manual, (&Lines::default(), &[]))
     }
 
     fn from_columns_within(
-        columns: [Vec<f64>; 6],
+        mut columns: [Vec<f64>; 6],
         manual: bool,
-        stretches: &[(f64, f64)],
+        (lines, stretches): (&Lines, &[(f64, f64)]),
     ) -> Result<Self, LogError> {
         let rows = columns[0].len();
         if let Some(c) = (0..6).find(|&c| columns[c].len() != rows) {
@@ -290,13 +256,12 @@ impl DriveLog {
                 columns[c].len()
             ));
         }
-        for (c, column) in columns.iter().enumerate() {
-            for (line, &value) in (1..).zip(column) {
-                within_limits(value, line, c)?;
+        for (c, column) in columns.iter_mut().enumerate() {
+            for (row, value) in column.iter_mut().enumerate() {
+                *value = within_limits(*value, c).map_err(|what| format!("{}: {what}", lines.place(row)))?;
             }
         }
-        let lines: Vec<u64> = (1..=rows as u64).collect();
-        Self::from_table(&lines, columns, manual, stretches)
+        Self::from_table(lines, columns, manual, stretches)
     }
 
     /// A log of a table's columns in the order of [`COLUMNS`]; the first is not looked at. Of a `manual` drive the guidance
@@ -305,24 +270,24 @@ impl DriveLog {
         time_s: Vec<f64>,
         columns: [Option<Vec<f64>>; 6],
         manual: bool,
-        stretches: &[(f64, f64)],
+        within: (&Lines, &[(f64, f64)]),
     ) -> Result<Self, LogError> {
         let nothing = || vec![0.0; time_s.len()];
         let mut columns = columns.map(|column| column.unwrap_or_else(nothing));
         columns[0] = time_s;
-        Self::from_columns_within(columns, manual, stretches).map_err(LogError::in_a_row)
+        Self::from_columns_within(columns, manual, within)
     }
 
     /// Puts columns that are in their limits on an even grid.
     fn from_table(
-        lines: &[u64],
+        lines: &Lines,
         columns: [Vec<f64>; 6],
         manual: bool,
         stretches: &[(f64, f64)],
     ) -> Result<Self, LogError> {
         let usual_s = usual_step(&columns[0], lines)?;
         let used = jumps::usable(&columns[0], lines, usual_s, stretches)?;
-        let lines = &lines[used.clone()];
+        let first = used.start;
         let [time, signals @ ..] = columns.map(|mut column| {
             column.truncate(used.end);
             column.split_off(used.start)
@@ -343,7 +308,7 @@ impl DriveLog {
                 return refuse(format!("{name} holds no number"));
             }
         }
-        check_wheel_resolution(&signals[2], lines)?;
+        check_wheel_resolution(&signals[2], (lines, first))?;
         Ok(Self {
             resampling: grid.autocorrelation(&time),
             findings: grid.finding.iter().cloned().collect(),
@@ -364,83 +329,37 @@ fn check_sensor(driver_torque_nm: &[f64]) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Where each of [`COLUMNS`] stands; all that are missing are named at once.
-fn find_columns(header: &[String], line: u64, manual: bool) -> Result<[Option<usize>; 6], LogError> {
-    let names: Vec<String> = header.iter().map(|name| name.to_ascii_lowercase()).collect();
-    let mut index = [None; 6];
-    let mut missing = Vec::new();
-    for (c, wanted) in COLUMNS.iter().enumerate() {
-        let mut places = names
-            .iter()
-            .enumerate()
-            .filter(|(_, n)| n == wanted)
-            .map(|(i, _)| i);
-        index[c] = places.next();
-        if places.next().is_some() {
-            return refuse(format!("line {line}: column {wanted} is there twice"));
-        }
-        if index[c].is_none() && !(manual && c == GUIDANCE_COLUMN) {
-            // The unit is the last part of a name: a column that differs only there is a likely mistake.
-            let stem = wanted.rsplit_once('_').map_or(*wanted, |(stem, _)| stem);
-            match names.iter().find(|n| n.starts_with(stem)) {
-                Some(near) => missing.push(format!("{wanted} (there is {near}: convert it)")),
-                None => missing.push((*wanted).to_owned()),
-            }
-        }
-    }
-    if !missing.is_empty() {
-        return refuse(format!(
-            "line {line}: missing column(s): {}; --map NAME=COLUMN names a column that is called otherwise",
-            missing.join(", ")
-        ));
-    }
-    Ok(index)
-}
-
-fn field(text: &str, line: u64, c: usize) -> Result<f64, LogError> {
-    let value = number(text).ok_or_else(|| TableError::NotANumber {
-        line,
-        column: COLUMNS[c].into(),
-        text: text.into(),
-    });
-    within_limits(value?, line, c)
-}
-
 /// A value that its column can have; missing if it is not finite.
-fn within_limits(value: f64, line: u64, c: usize) -> Result<f64, LogError> {
+fn within_limits(value: f64, c: usize) -> Result<f64, String> {
     let (limit, hint) = LIMITS[c];
-    if !value.is_finite() {
-        return match c {
-            0 => refuse(format!(
-                "line {line}: time_s is {value}, which is not a finite number"
-            )),
-            _ => Ok(f64::NAN),
-        };
+    match value.is_finite() {
+        false if c == 0 => Err(format!("time_s is {value}, which is not a finite number")),
+        false => Ok(f64::NAN),
+        true if value.abs() > limit => {
+            let name = COLUMNS[c];
+            Err(format!(
+                "{name} is {value}, outside -{limit:.4} to {limit:.4}: {hint}"
+            ))
+        }
+        true => Ok(value),
     }
-    if value.abs() > limit {
-        return refuse(format!(
-            "line {line}: {} is {value}, outside -{limit:.4} to {limit:.4}: {hint}",
-            COLUMNS[c]
-        ));
-    }
-    Ok(value)
 }
 
 fn too_short(span_s: f64) -> String {
     format!("the log covers {span_s:.3} s, less than {SHORTEST_S} s")
 }
 
-fn check_wheel_resolution(wheel_angle: &[f64], lines: &[u64]) -> Result<(), LogError> {
+fn check_wheel_resolution(wheel_angle: &[f64], (lines, first): (&Lines, usize)) -> Result<(), LogError> {
     let step = wheel_angle
         .windows(2)
         .map(|w| (w[1] - w[0]).abs())
         .filter(|&d| d > 1e-12)
         .fold(f64::INFINITY, f64::min);
     if step.is_finite() && step > COARSEST_WHEEL_STEP_RAD {
-        let first = wheel_angle.windows(2).position(|w| (w[1] - w[0]).abs() > 1e-12);
-        let line = lines[(first.unwrap_or(0) + 1).min(lines.len() - 1)];
+        let moves = wheel_angle.windows(2).position(|w| (w[1] - w[0]).abs() > 1e-12);
+        let place = lines.place(first + moves.unwrap_or(0) + 1);
         return refuse(format!(
-            "line {line}: wheel_angle_rad moves by {step:.3} at least, coarser than {COARSEST_WHEEL_STEP_RAD} rad: \
+            "{place}: wheel_angle_rad moves by {step:.3} at least, coarser than {COARSEST_WHEEL_STEP_RAD} rad: \
              is it in degrees?"
         ));
     }

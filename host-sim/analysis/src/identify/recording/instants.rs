@@ -120,22 +120,21 @@ mod tests {
                 source: String::new(),
                 values: (0..count).map(value).collect(),
             }],
+            ..Group::default()
         }
     }
 
     #[test]
     fn a_slow_camera_is_held_and_a_slow_angle_is_not() {
         let zigzag = |k: usize| [0.2, -0.2][k % 2];
-        let recording = Recording {
-            groups: vec![
-                group("Torque", "N.m", 0.0, 0.01, zigzag),
-                group("Angle", "rad", 0.0, 0.04, |k| 0.01 * k as f64),
-                group("Assist", "N.m", 0.0, 0.04, |k| 0.01 * k as f64),
-                group("Offset", "cm", 0.0, 0.04, |k| 100.0 * zigzag(k)),
-                group("Heading", "rad", 0.0, 0.01, zigzag),
-                group(SPEED_COLUMN, "km/h", 0.0, 0.01, |k| 36.0 + 0.09 * k as f64),
-            ],
-        };
+        let recording = Recording::from(vec![
+            group("Torque", "N.m", 0.0, 0.01, zigzag),
+            group("Angle", "rad", 0.0, 0.04, |k| 0.01 * k as f64),
+            group("Assist", "N.m", 0.0, 0.04, |k| 0.01 * k as f64),
+            group("Offset", "cm", 0.0, 0.04, |k| 100.0 * zigzag(k)),
+            group("Heading", "rad", 0.0, 0.01, zigzag),
+            group(SPEED_COLUMN, "km/h", 0.0, 0.01, |k| 36.0 + 0.09 * k as f64),
+        ]);
         let map = |text: &str| text.parse::<Mapping>().unwrap();
         let maps = [
             "driver_torque_nm=Torque",
@@ -145,7 +144,7 @@ mod tests {
             "e_theta_rad=Heading",
         ]
         .map(map);
-        let (log, _) = of_channels(&recording, &maps, &bus_trace::Recording::default()).unwrap();
+        let (log, _) = of_channels(recording, &maps, &bus_trace::Recording::default()).unwrap();
         assert!((log.dt_s - 0.01).abs() < 1e-12, "{}", log.dt_s);
         let [least, most] = log.speeds_m_per_s.unwrap();
         assert!((least - 10.0).abs() < 1e-9 && (most - 39.975).abs() < 1e-9 && log.changes_speed());

@@ -10,11 +10,13 @@ mod instants;
 mod layout;
 mod mapping;
 
+use std::io::Read;
 use std::path::Path;
 
-use haptic_log::formats::{self, Contents, Format, TimeColumn};
-use haptic_log::recording::{Group, Recording, RecordingError, Series};
-use haptic_log::table::TableReader;
+use haptic_log::candump;
+use haptic_log::formats::{self, BusLog, Contents, Format};
+use haptic_log::notes::Note;
+use haptic_log::recording::{Group, Lines, Recording, RecordingError, Series, Term};
 use haptic_log::units;
 
 use super::bus_trace;
@@ -23,15 +25,17 @@ use instants::at_the_torque;
 pub use layout::{Layout, Table};
 pub use mapping::Mapping;
 
-/// What can be mapped: the columns that a log must have, and the speed.
-const NAMES: [&str; 7] = {
+/// What can be mapped: the columns that a log must have, and the speed, in one of two units.
+const NAMES: [&str; 8] = {
     let [a, b, c, d, e, f] = COLUMNS;
-    [a, b, c, d, e, f, SPEED_COLUMN]
+    [a, b, c, d, e, f, SPEED_COLUMN, "speed_kmh"]
 };
-const UNITS: [&str; 7] = ["s", "m", "rad", "rad", "N.m", "N.m", "m/s"];
+const UNITS: [&str; 8] = ["s", "m", "rad", "rad", "N.m", "N.m", "m/s", "km/h"];
 const GUIDANCE: usize = 4;
 const DRIVER: usize = 5;
 const SPEED: usize = 6;
+/// Faster than cars are driven, m/s: the unit may be another.
+const FAST_M_PER_S: f64 = 50.0;
 
 /// Reads the log at `path`: a CSV file, a recording of the bus, or a file of another tool by its extension; `layout` says what
 /// the columns of a table are, if they are not those of a log. The sentences say what was converted or computed.
@@ -44,9 +48,51 @@ pub fn open(
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
+    let named = |e: LogError| LogError::in_file(path.display(), e);
+    let format = Format::from_path(path).ok();
+    let mut head = Vec::new();
+    let opened = std::fs::File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    opened.map_err(|e| LogError::in_file(path.display(), e))?;
+    if let Some(format) = bus_format(format, &head).filter(|_| layout.is_none()) {
+        let log = BusLog::of_file(path, format).map_err(LogError::from);
+        let read = log.and_then(|log| once(maps).and_then(|()| of_bus(log, maps, how)));
+        return read.map_err(named);
+    }
+    if layout.is_none() && matches!(format, None | Some(Format::Csv | Format::Candump)) {
+        // As it comes: a table of many hours fills a memory.
+        let file = std::fs::File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
+        return once(maps).and_then(|()| of_csv(file, maps, how)).map_err(named);
+    }
     let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
-    of_bytes(bytes, Format::from_path(path).ok(), layout, maps, how)
-        .map_err(|e| LogError::in_file(path.display(), e))
+    of_bytes(bytes, format, layout, maps, how).map_err(named)
+}
+
+/// How much of a text shows whether it is a table or a trace.
+const HEAD: u64 = 1 << 16;
+
+/// The format of frames that a file has; a text is told by its looks.
+fn bus_format(format: Option<Format>, head: &[u8]) -> Option<Format> {
+    match format {
+        None | Some(Format::Csv | Format::Candump) => {
+            candump::looks_like_one(head).then_some(Format::Candump)
+        }
+        Some(format) => format.holds_frames().then_some(format),
+    }
+}
+
+fn of_bus(
+    log: BusLog,
+    maps: &[Mapping],
+    how: &bus_trace::Recording<'_>,
+) -> Result<(DriveLog, Vec<String>), LogError> {
+    if maps.is_empty() {
+        let (log, note) = bus_trace::of_bus(log, how)?;
+        return Ok((log, vec![note.into()]));
+    }
+    let dbc = bus_trace::dbc_file(how.dbc)?;
+    let only = &|name: &str| is_wanted(maps, name);
+    let recording = formats::dbc::channels(&log.of_bus(how.bus), &dbc, Some(only))?;
+    of_channels(recording, maps, how)
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.
@@ -64,25 +110,40 @@ pub fn of_bytes(
     if let Some(layout) = layout {
         return layout.read(&bytes, format, maps, how);
     }
-    // Text files keep their own readers: those name lines, and tell a table from a trace by its looks.
-    let is_text = matches!(format, None | Some(Format::Csv | Format::Candump));
-    if maps.is_empty() && is_text && !has_units(&bytes) {
-        let (log, note) = bus_trace::of_text(&bytes, how)?;
-        return Ok((log, note.map(String::from).into_iter().collect()));
+    let format = bus_format(format, &bytes).unwrap_or(match format {
+        None | Some(Format::Candump) => Format::Csv,
+        Some(format) => format,
+    });
+    of_contents(
+        formats::read_bytes(bytes, format, reading(maps, &|name| is_wanted(maps, name)))?,
+        maps,
+        how,
+    )
+}
+
+/// A log of a CSV file's text, of which only the columns that are needed are kept.
+pub(super) fn of_csv(
+    source: impl Read,
+    maps: &[Mapping],
+    how: &bus_trace::Recording<'_>,
+) -> Result<(DriveLog, Vec<String>), LogError> {
+    let reading = &|name: &str| is_wanted(maps, name);
+    of_contents(
+        formats::read_from(source, Format::Csv, self::reading(maps, reading))?,
+        maps,
+        how,
+    )
+}
+
+fn of_contents(
+    contents: Contents,
+    maps: &[Mapping],
+    how: &bus_trace::Recording<'_>,
+) -> Result<(DriveLog, Vec<String>), LogError> {
+    match contents {
+        Contents::Frames(log) => of_bus(log, maps, how),
+        Contents::Channels(recording) => of_channels(recording, maps, how),
     }
-    let contents = formats::read_bytes(bytes, format.unwrap_or(Format::Csv), time_of(maps).as_ref());
-    let recording = match contents? {
-        Contents::Frames(frames) if maps.is_empty() => {
-            let (log, note) = bus_trace::of_frames(&frames, how)?;
-            return Ok((log, vec![note.into()]));
-        }
-        Contents::Frames(frames) => {
-            let dbc = bus_trace::dbc_text(how.dbc)?;
-            formats::dbc::channels(&frames, &dbc)?
-        }
-        Contents::Channels(recording) => recording,
-    };
-    of_channels(&recording, maps, how)
 }
 
 /// The log of a table's columns in memory, by their names with or without units in brackets. What is not asked for may have
@@ -99,7 +160,7 @@ pub fn of_table(
     let is_there = |map: &Mapping| {
         columns
             .iter()
-            .any(|(name, _)| units::bare(name) == units::bare(&map.channel))
+            .any(|(name, _)| units::bare(name) == units::bare(&map.term.channel))
     };
     if let Some(map) = maps.iter().find(|map| !is_there(map)) {
         let names: Vec<&str> = columns.iter().take(8).map(|(name, _)| name.as_str()).collect();
@@ -108,16 +169,14 @@ pub fn of_table(
         } else {
             names.join(", ")
         };
-        return refuse(format!("there is no channel {}; there are {there}", map.channel));
+        return refuse(format!(
+            "there is no channel {}; there are {there}",
+            map.term.channel
+        ));
     }
-    let asked = NAMES
-        .into_iter()
-        .chain(maps.iter().map(|map| map.channel.as_str()));
-    let asked: Vec<&str> = asked.map(units::bare).collect();
-    columns.retain(|(name, _)| asked.contains(&units::bare(name)));
-    let recording = formats::table(columns, time_of(maps).as_ref());
-    let recording = recording?;
-    of_channels(&recording, maps, how)
+    columns.retain(|(name, _)| is_wanted(maps, name));
+    let recording = formats::table(columns, reading(maps, &|_| true).time)?;
+    of_channels(recording, maps, how)
 }
 
 fn once(maps: &[Mapping]) -> Result<(), LogError> {
@@ -127,21 +186,22 @@ fn once(maps: &[Mapping]) -> Result<(), LogError> {
     })
 }
 
-fn time_of(maps: &[Mapping]) -> Option<TimeColumn> {
-    maps.iter().find(|map| map.column == 0).map(|map| TimeColumn {
-        name: map.channel.clone(),
-        scale: map.scale,
-    })
+/// What is to be read of a file: the time by its mapping, and the channels that are wanted.
+fn reading<'a>(maps: &'a [Mapping], only: &'a dyn Fn(&str) -> bool) -> formats::Reading<'a> {
+    formats::Reading {
+        time: maps.iter().find(|map| map.column == 0).map(|map| &map.term),
+        only: Some(only),
+    }
 }
 
-/// Whether a table has columns of a log with their units in brackets.
-fn has_units(bytes: &[u8]) -> bool {
-    let is_column = |name: &str| NAMES.iter().any(|column| column.eq_ignore_ascii_case(name));
-    let with_unit = |text: &String| units::in_brackets(text).is_some_and(|(name, _)| is_column(name));
-    let heading = bytes
-        .split(|byte| *byte == b'\n')
-        .find(|line| !line.starts_with(b"#") && !line.trim_ascii().is_empty());
-    TableReader::new(heading.unwrap_or_default()).is_ok_and(|table| table.header().iter().any(with_unit))
+/// Whether a log is made of a channel of this name.
+fn is_wanted(maps: &[Mapping], name: &str) -> bool {
+    let is_it = |wanted: &str| {
+        let same =
+            |own: &str| own.eq_ignore_ascii_case(wanted) || own.eq_ignore_ascii_case(units::bare(wanted));
+        same(name) || same(units::bare(name)) || wanted.ends_with(&format!(".{name}"))
+    };
+    NAMES.into_iter().any(is_it) || maps.iter().any(|map| is_it(&map.term.channel))
 }
 
 /// A column's channel with what makes it SI.
@@ -152,116 +212,176 @@ struct Column<'a> {
 }
 
 fn of_channels(
-    recording: &Recording,
+    mut recording: Recording,
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     let manual = how.manual;
-    let mut notes = Vec::new();
+    let (mut notes, mut missing) = (Vec::new(), Vec::new());
     let mut columns: [Option<Column<'_>>; 6] = Default::default();
     for (i, column) in columns.iter_mut().enumerate().skip(1) {
         let map = maps.iter().find(|map| map.column == i);
-        let (group, series) = match wanted(recording, i, map) {
+        let (group, series) = match recording.find(map.map_or(NAMES[i], |map| &map.term.channel)) {
             Ok(found) => found,
             Err(_) if manual && i == GUIDANCE && map.is_none() => continue,
-            Err(error) if map.is_none() => {
-                let wanted = COLUMNS[i];
-                return refuse(format!(
-                    "{error}; --map {wanted}=CHANNEL[*SCALE] names another one"
-                ));
+            Err(_) if map.is_none() => {
+                missing.push(NAMES[i]);
+                continue;
             }
             Err(error) => return Err(error.into()),
         };
-        let scale = scale(series, i, map)?;
+        let scale = factor(series, i, map)?;
         if scale != 1.0 {
-            notes.push(converted(series, i, scale));
+            notes.push(converted(series, i, map, scale));
         }
         *column = Some(Column { group, series, scale });
+    }
+    if let Some(error) = missing.iter().find_map(|name| recording.notes.left_out(name)) {
+        return Err(error.into());
+    }
+    if !missing.is_empty() {
+        return refuse(are_missing(&recording, &missing));
     }
     let one = columns
         .iter()
         .flatten()
         .all(|c| std::ptr::eq(c.group, columns[DRIVER].as_ref().map_or(c.group, |d| d.group)));
-    let (time_s, values) = if one {
-        rows(&columns)
+    let speeds = speeds(&recording, maps, &mut notes)?;
+    let (time_s, values, lines) = if one {
+        let places = columns.map(|column| column.map(|column| column.place(&recording)));
+        rows(&mut recording, &places)
     } else {
-        at_the_torque(&columns, &mut notes)?
+        let (time_s, values) = at_the_torque(&columns, &mut notes)?;
+        (time_s, values, Lines::default())
     };
-    let mut log = DriveLog::from_rows(time_s, values, manual, how.stretches)?;
-    tell_speed(&mut log, recording, maps, &mut notes)?;
+    let mut log = DriveLog::from_rows(time_s, values, manual, (&lines, how.stretches))?;
+    log.findings.extend(recording.notes.iter().map(Note::finding));
+    if let Some(ends) = speeds {
+        log.tell_speed(&ends);
+        notes.extend(fast(&log));
+    }
     Ok((log, notes))
 }
 
-/// The channel of a column.
-fn wanted<'a>(
-    recording: &'a Recording,
-    column: usize,
-    map: Option<&Mapping>,
-) -> Result<(&'a Group, &'a Series), RecordingError> {
-    recording.find(map.map_or(NAMES[column], |map| map.channel.as_str()))
+/// Which columns a recording lacks, with what is like them.
+fn are_missing(recording: &Recording, names: &[&str]) -> String {
+    if let [name] = names
+        && let Err(error) = recording.find(name)
+    {
+        return format!("{error}; --map {name}=CHANNEL names another one");
+    }
+    let with_near = |name: &&str| match recording.like(name).first() {
+        Some(near) => format!("{name} (there is {near})"),
+        None => (*name).to_owned(),
+    };
+    let names: Vec<String> = names.iter().map(with_near).collect();
+    let names = names.join(", ");
+    format!("there are no channels {names}; --map NAME=CHANNEL names others")
 }
 
 /// What a channel's values are multiplied by to be a column's.
-fn scale(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, LogError> {
-    let (wanted, name) = (UNITS[column], &series.name);
-    match (map.and_then(|map| map.scale), series.unit.as_str()) {
-        (Some(scale), _) => Ok(scale),
-        (None, "") => Ok(1.0),
-        (None, unit) => units::factor(unit, wanted).ok_or_else(|| {
-            format!(
-                "channel {name}: its unit {unit:?} is not known as one of {wanted}; --map {}={name}*SCALE says how \
-                 many {wanted} it is",
-                NAMES[column]
-            )
-            .into()
-        }),
-    }
+fn factor(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, RecordingError> {
+    let own = || Term {
+        channel: series.name.clone(),
+        factor: None,
+    };
+    let term = map.map_or_else(own, |map| map.term.clone());
+    term.factor(series, UNITS[column])
 }
 
-fn converted(series: &Series, column: usize, scale: f64) -> String {
-    format!(
-        "{} is {} ({:?}) times {scale}",
-        NAMES[column], series.name, series.unit
-    )
+fn converted(series: &Series, column: usize, map: Option<&Mapping>, scale: f64) -> String {
+    let said = map.map(|map| map.term.channel.as_str());
+    let said = said.filter(|said| units::in_brackets(said).is_some());
+    let own = || format!("{} ({:?})", series.name, series.unit);
+    let channel = said.map_or_else(own, str::to_owned);
+    format!("{} is {channel} times {scale}", NAMES[column])
 }
 
-/// What the recording says of the speed, if it does. It is not needed: without a mapping another unit or name tells nothing.
-fn tell_speed(
-    log: &mut DriveLog,
+/// The least and the largest speed, m/s, if the recording tells it. It is not needed: without a mapping another unit or name tells nothing.
+fn speeds(
     recording: &Recording,
     maps: &[Mapping],
     notes: &mut Vec<String>,
-) -> Result<(), LogError> {
-    let map = maps.iter().find(|map| map.column == SPEED);
-    let found = wanted(recording, SPEED, map).map_err(LogError::from);
-    let found = found.and_then(|(_, series)| Ok((series, scale(series, SPEED, map)?)));
+) -> Result<Option<[f64; 2]>, LogError> {
+    let mapped: Vec<&Mapping> = maps.iter().filter(|map| map.column >= SPEED).collect();
+    let (column, map) = match mapped[..] {
+        [_, _, ..] => {
+            let [a, b] = [NAMES[SPEED], NAMES[SPEED + 1]];
+            return refuse(format!("{a} and {b} are mapped: one of them is wanted"));
+        }
+        [map] => (map.column, Some(map)),
+        [] if recording.find(SPEED_COLUMN).is_ok() => (SPEED, None),
+        [] => (SPEED + 1, None),
+    };
+    let found = recording.find(map.map_or(NAMES[column], |map| &map.term.channel));
+    let found = found.and_then(|(_, series)| Ok((series, factor(series, column, map)?)));
     let (series, scale) = match found {
         Ok(found) => found,
-        Err(_) if map.is_none() => return Ok(()),
-        Err(error) => return Err(error),
+        Err(_) if map.is_none() => return Ok(None),
+        Err(error) => return Err(error.into()),
     };
     if scale != 1.0 {
-        notes.push(converted(series, SPEED, scale));
+        notes.push(converted(series, column, map, scale));
     }
-    let speeds: Vec<f64> = series.values.iter().map(|v| v * scale).collect();
-    log.tell_speed(&speeds);
-    Ok(())
+    let m_per_s = units::factor(UNITS[column], "m/s").unwrap_or(1.0);
+    let known = || {
+        series
+            .values
+            .iter()
+            .filter(|v| v.is_finite())
+            .map(|v| v * scale * m_per_s)
+    };
+    let ends = known().reduce(f64::min).zip(known().reduce(f64::max));
+    Ok(ends.map(Into::into))
+}
+
+/// A sentence about a speed that no car is likely to have.
+fn fast(log: &DriveLog) -> Option<String> {
+    let [_, most] = log.speeds_m_per_s.filter(|[_, most]| *most > FAST_M_PER_S)?;
+    let kmh = 3.6 * most;
+    Some(format!(
+        "The speed goes up to {most:.1} m/s, which is {kmh:.0} km/h: is it in km/h?"
+    ))
 }
 
 type Values = [Option<Vec<f64>>; 6];
 
-/// The columns as the table has them.
-fn rows(columns: &[Option<Column<'_>>; 6]) -> (Vec<f64>, Values) {
+/// Where a column stands: its group, its channel there, and what makes it SI.
+type Place = (usize, usize, f64);
+
+impl Column<'_> {
+    fn place(&self, recording: &Recording) -> Place {
+        let is_group = |group: &Group| std::ptr::eq(group, self.group);
+        let is_series = |series: &Series| std::ptr::eq(series, self.series);
+        let group = recording.groups.iter().position(is_group);
+        let series = self.group.channels.iter().position(is_series);
+        (group.unwrap_or(0), series.unwrap_or(0), self.scale)
+    }
+}
+
+/// The columns as the table has them, taken out of it: of a drive of many hours two copies are too many.
+fn rows(recording: &mut Recording, places: &[Option<Place>; 6]) -> (Vec<f64>, Values, Lines) {
     let values = std::array::from_fn(|i| {
-        let column = columns[i].as_ref()?;
-        Some(column.series.values.iter().map(|v| v * column.scale).collect())
+        let (group, channel, scale) = places[i]?;
+        let is_same = |other: &Place| (other.0, other.1) == (group, channel);
+        let is_wanted_again = places[i + 1..].iter().flatten().any(is_same);
+        let series = &mut recording.groups[group].channels[channel];
+        let mut values = match is_wanted_again {
+            true => series.values.clone(),
+            false => std::mem::take(&mut series.values),
+        };
+        if scale != 1.0 {
+            values.iter_mut().for_each(|value| *value *= scale);
+        }
+        Some(values)
     });
-    (
-        columns
-            .iter()
-            .flatten()
-            .next()
-            .map_or(Vec::new(), |c| c.group.time_s.clone()),
-        values,
-    )
+    let first = places.iter().flatten().next().map_or(0, |place| place.0);
+    match recording.groups.get_mut(first) {
+        Some(group) => (
+            std::mem::take(&mut group.time_s),
+            values,
+            std::mem::take(&mut group.lines),
+        ),
+        None => (Vec::new(), values, Lines::default()),
+    }
 }

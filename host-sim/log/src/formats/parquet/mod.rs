@@ -4,12 +4,13 @@
 mod nesting;
 mod pages;
 
+use std::io::Write;
 use std::sync::Arc;
 
 use bytes::Bytes;
 use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
-use parquet::data_type::{DataType, DoubleType};
+use parquet::data_type::{DataType, DoubleType, Int96};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
@@ -19,18 +20,20 @@ use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor, Type};
 use serde_json::{Value, json};
 
 use self::pages::Pages;
-use super::bytes::Budget;
+use super::bytes::{Budget, half};
+use super::{Only, Table};
 use crate::guard::guarded;
+use crate::notes::Fate;
 use crate::recording::{Group, RecordingError, Series, refuse};
 
 const KEY: &str = "haptic.channels";
 
-pub(super) fn read(file: Vec<u8>) -> Result<Vec<Series>, RecordingError> {
+pub(super) fn read(file: Vec<u8>, only: Only<'_>) -> Result<Table, RecordingError> {
     // The reader is safe code, but not written for files that lie.
-    guarded(|| columns(file.into())).unwrap_or_else(|| Err(refuse("the file is damaged")))
+    guarded(|| columns(file.into(), only)).unwrap_or_else(|| Err(refuse("the file is damaged")))
 }
 
-fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
+fn columns(file: Bytes, only: Only<'_>) -> Result<Table, RecordingError> {
     if !nesting::is_shallow(&file) {
         return Err("this is no Parquet file, or its schema is nested too deep".into());
     }
@@ -44,13 +47,24 @@ fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
         .unwrap_or_default();
     let schema = metadata.file_metadata().schema_descr();
     let mut budget = Budget::new(&file);
-    let mut found = Vec::new();
+    let mut found = Table::default();
     for (c, column) in schema.columns().iter().enumerate() {
-        let Some(kind) = Kind::from_column(column) else {
+        // A field of a struct has the struct's name before its own.
+        let name = column.path().parts().join(".");
+        if only.is_some_and(|is_wanted| !is_wanted(&name)) {
+            found.unread.push(name);
             continue;
+        }
+        let kind = match Kind::from_column(column) {
+            Ok(kind) => kind,
+            Err(why) => {
+                found.notes.channel(Fate::LeftOut, name, why);
+                continue;
+            }
         };
-        let name = schema.column(c).name().to_owned();
-        let mut values = Vec::new();
+        let rows = metadata.row_groups().iter().map(|group| group.num_rows());
+        let rows = usize::try_from(rows.sum::<i64>()).unwrap_or(0);
+        let mut values = Vec::with_capacity(budget.at_most(rows));
         for group in metadata.row_groups() {
             let rows = usize::try_from(group.num_rows()).unwrap_or(0);
             let read = Pages::new(&file, group.column(c), rows)
@@ -63,7 +77,12 @@ fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
         let is_it = |c: &&Value| c["name"] == name.as_str();
         let entry = said.as_array().and_then(|all| all.iter().find(is_it));
         let text = |key: &str| entry.and_then(|e| e[key].as_str()).unwrap_or_default().to_owned();
-        found.push(Series {
+        if let Numbers::Decimal(_) = kind.numbers {
+            found
+                .notes
+                .channel(Fate::Converted, name.clone(), "decimal to float");
+        }
+        found.columns.push(Series {
             // What is a date counts in parts of a second.
             unit: kind.unit.map_or_else(|| text("unit"), str::to_owned),
             source: text("source"),
@@ -78,47 +97,94 @@ fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
 const BATCH: usize = 1 << 16;
 
 /// How the numbers of a column are meant.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Kind {
-    is_unsigned: bool,
-    /// That of a date.
+    numbers: Numbers,
+    /// That of a date or a time of day.
     unit: Option<&'static str>,
 }
 
+#[derive(Debug, Clone, Copy)]
+enum Numbers {
+    Signed,
+    Unsigned,
+    /// Whole numbers of so many digits behind the point, the highest byte first where they are bytes.
+    Decimal(i32),
+    /// Two bytes each.
+    Half,
+    /// Nanoseconds of a day and the Julian day.
+    Int96,
+}
+
 impl Kind {
-    /// None for what is no number.
-    fn from_column(column: &ColumnDescriptor) -> Option<Self> {
+    /// What a column holds, or why it is no channel.
+    fn from_column(column: &ColumnDescriptor) -> Result<Self, &'static str> {
         use ConvertedType as Old;
-        use Physical::{BOOLEAN, DOUBLE, FLOAT, INT32, INT64};
-        if column.path().parts().len() != 1 || column.max_rep_level() > 0 || column.max_def_level() > 1 {
-            return None;
+        use Physical::{BOOLEAN, BYTE_ARRAY, DOUBLE, FIXED_LEN_BYTE_ARRAY, FLOAT, INT32, INT64, INT96};
+        if column.max_rep_level() > 0 {
+            return Err("array");
         }
-        let is_number = matches!(column.physical_type(), BOOLEAN | INT32 | INT64 | FLOAT | DOUBLE);
-        let in_parts = |unit| Self {
-            unit: Some(unit),
-            ..Self::default()
+        let is_bytes = matches!(column.physical_type(), BYTE_ARRAY | FIXED_LEN_BYTE_ARRAY);
+        let plain = |numbers| Ok(Self { numbers, unit: None });
+        let in_parts = |unit| {
+            let (numbers, unit) = (Numbers::Signed, Some(unit));
+            Ok(Self { numbers, unit })
         };
-        let kind = match (column.logical_type_ref(), column.converted_type()) {
-            (Some(LogicalType::Timestamp(stamp)), _) => in_parts(match stamp.unit {
-                TimeUnit::MILLIS => "ms",
-                TimeUnit::MICROS => "us",
-                TimeUnit::NANOS => "ns",
-            }),
-            (None, Old::TIMESTAMP_MILLIS) => in_parts("ms"),
-            (None, Old::TIMESTAMP_MICROS) => in_parts("us"),
-            (Some(LogicalType::Integer(integer)), _) => Self {
-                is_unsigned: !integer.is_signed,
-                unit: None,
-            },
-            (None, Old::UINT_8 | Old::UINT_16 | Old::UINT_32 | Old::UINT_64) => Self {
-                is_unsigned: true,
-                unit: None,
-            },
-            (None, Old::NONE | Old::INT_8 | Old::INT_16 | Old::INT_32 | Old::INT_64) => Self::default(),
-            _ => return None,
+        let part = |unit: &TimeUnit| match unit {
+            TimeUnit::MILLIS => "ms",
+            TimeUnit::MICROS => "us",
+            TimeUnit::NANOS => "ns",
         };
-        is_number.then_some(kind)
+        match (column.logical_type_ref(), column.converted_type()) {
+            (Some(LogicalType::Timestamp(stamp)), _) => in_parts(part(&stamp.unit)),
+            (Some(LogicalType::Time(time)), _) => in_parts(part(&time.unit)),
+            (None, Old::TIMESTAMP_MILLIS | Old::TIME_MILLIS) => in_parts("ms"),
+            (None, Old::TIMESTAMP_MICROS | Old::TIME_MICROS) => in_parts("us"),
+            (Some(LogicalType::Date), _) | (None, Old::DATE) => Err("date without a time of day"),
+            (Some(LogicalType::Decimal(_)), _) | (None, Old::DECIMAL) => {
+                plain(Numbers::Decimal(column.type_scale()))
+            }
+            (Some(LogicalType::Float16), _) if is_bytes => plain(Numbers::Half),
+            (Some(LogicalType::Integer(integer)), _) if !integer.is_signed => plain(Numbers::Unsigned),
+            (None, Old::UINT_8 | Old::UINT_16 | Old::UINT_32 | Old::UINT_64) => plain(Numbers::Unsigned),
+            _ => match column.physical_type() {
+                BOOLEAN | INT32 | INT64 | FLOAT | DOUBLE => plain(Numbers::Signed),
+                INT96 => {
+                    let (numbers, unit) = (Numbers::Int96, Some("s"));
+                    Ok(Self { numbers, unit })
+                }
+                BYTE_ARRAY | FIXED_LEN_BYTE_ARRAY => Err("text or bytes"),
+            },
+        }
     }
+
+    fn of_bytes(self, bytes: &[u8]) -> f64 {
+        match (self.numbers, bytes) {
+            (Numbers::Half, &[low, high]) => half(u16::from_le_bytes([low, high])),
+            (Numbers::Decimal(scale), [first, ..]) if bytes.len() <= 16 => {
+                let sign = if first >> 7 == 1 { -1 } else { 0 };
+                let whole = bytes
+                    .iter()
+                    .fold(sign, |whole: i128, byte| whole << 8 | i128::from(*byte));
+                decimal(whole as f64, scale)
+            }
+            _ => f64::NAN,
+        }
+    }
+}
+
+/// A whole number with so many of its digits behind the point.
+fn decimal(whole: f64, scale: i32) -> f64 {
+    whole / 10_f64.powi(scale)
+}
+
+/// Nanoseconds of a day and the Julian day, as seconds since 1970.
+fn of_int96(x: &Int96) -> f64 {
+    const JULIAN_1970: f64 = 2_440_588.0;
+    let &[low, high, day] = x.data() else {
+        return f64::NAN;
+    };
+    (f64::from(day) - JULIAN_1970) * 86_400.0 + (u64::from(high) << 32 | u64::from(low)) as f64 * 1e-9
 }
 
 /// Appends the values of a column chunk, NaN where there is none; says how many there are.
@@ -131,14 +197,16 @@ fn append(
 ) -> Result<usize, ParquetError> {
     fn all<T: DataType>(
         mut reader: ColumnReaderImpl<T>,
-        has_gaps: bool,
+        deepest: i16,
         out: &mut Vec<f64>,
         budget: &mut Budget,
         number: impl Fn(&T::T) -> f64,
     ) -> Result<usize, ParquetError> {
         let before = out.len();
+        let (mut values, mut levels) = (Vec::new(), Vec::new());
         loop {
-            let (mut values, mut levels) = (Vec::new(), Vec::new());
+            values.clear();
+            levels.clear();
             let (rows, ..) = reader.read_records(BATCH, Some(&mut levels), None, &mut values)?;
             if rows == 0 {
                 return Ok(out.len() - before);
@@ -147,32 +215,40 @@ fn append(
             let taken = budget.take(rows);
             taken.map_err(|e| ParquetError::General(e.to_string()))?;
             let mut there = values.iter().map(&number);
-            if has_gaps {
-                let level = |level: &i16| if *level > 0 { there.next() } else { None };
+            if deepest > 0 {
+                let level = |level: &i16| if *level == deepest { there.next() } else { None };
                 out.extend(levels.iter().map(level).map(|value| value.unwrap_or(f64::NAN)));
             } else {
                 out.extend(there);
             }
         }
     }
-    let has_gaps = column.max_def_level() > 0;
-    match get_column_reader(column, Box::new(pages)) {
-        ColumnReader::BoolColumnReader(r) => all(r, has_gaps, out, budget, |x| f64::from(u8::from(*x))),
-        ColumnReader::Int32ColumnReader(r) if kind.is_unsigned => {
-            all(r, has_gaps, out, budget, |x| f64::from(*x as u32))
+    // A value is there where every struct around it is too.
+    let deepest = column.max_def_level();
+    use ColumnReader as R;
+    match (get_column_reader(column, Box::new(pages)), kind.numbers) {
+        (R::BoolColumnReader(r), _) => all(r, deepest, out, budget, |x| f64::from(u8::from(*x))),
+        (R::Int32ColumnReader(r), Numbers::Unsigned) => {
+            all(r, deepest, out, budget, |x| f64::from(*x as u32))
         }
-        ColumnReader::Int32ColumnReader(r) => all(r, has_gaps, out, budget, |x| f64::from(*x)),
-        ColumnReader::Int64ColumnReader(r) if kind.is_unsigned => {
-            all(r, has_gaps, out, budget, |x| *x as u64 as f64)
+        (R::Int32ColumnReader(r), Numbers::Decimal(scale)) => {
+            all(r, deepest, out, budget, |x| decimal(f64::from(*x), scale))
         }
-        ColumnReader::Int64ColumnReader(r) => all(r, has_gaps, out, budget, |x| *x as f64),
-        ColumnReader::FloatColumnReader(r) => all(r, has_gaps, out, budget, |x| f64::from(*x)),
-        ColumnReader::DoubleColumnReader(r) => all(r, has_gaps, out, budget, |x| *x),
-        _ => Ok(0),
+        (R::Int32ColumnReader(r), _) => all(r, deepest, out, budget, |x| f64::from(*x)),
+        (R::Int64ColumnReader(r), Numbers::Unsigned) => all(r, deepest, out, budget, |x| *x as u64 as f64),
+        (R::Int64ColumnReader(r), Numbers::Decimal(scale)) => {
+            all(r, deepest, out, budget, |x| decimal(*x as f64, scale))
+        }
+        (R::Int64ColumnReader(r), _) => all(r, deepest, out, budget, |x| *x as f64),
+        (R::Int96ColumnReader(r), _) => all(r, deepest, out, budget, of_int96),
+        (R::FloatColumnReader(r), _) => all(r, deepest, out, budget, |x| f64::from(*x)),
+        (R::DoubleColumnReader(r), _) => all(r, deepest, out, budget, |x| *x),
+        (R::ByteArrayColumnReader(r), _) => all(r, deepest, out, budget, |x| kind.of_bytes(x.data())),
+        (R::FixedLenByteArrayColumnReader(r), _) => all(r, deepest, out, budget, |x| kind.of_bytes(x.data())),
     }
 }
 
-pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
+pub(super) fn write(group: &Group, out: impl Write + Send) -> Result<(), RecordingError> {
     let time = Series {
         name: "time_s".into(),
         unit: "s".into(),
@@ -208,9 +284,8 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
             Value::Array(channels).to_string(),
         )]))
         .build();
-    let mut out = Vec::new();
     let mut writer =
-        SerializedFileWriter::new(&mut out, Arc::new(schema), Arc::new(properties)).map_err(refuse)?;
+        SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties)).map_err(refuse)?;
     let mut rows = writer.next_row_group().map_err(refuse)?;
     for channel in all {
         let Some(mut column) = rows.next_column().map_err(refuse)? else {
@@ -226,5 +301,5 @@ pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {
     }
     rows.close().map_err(refuse)?;
     writer.close().map_err(refuse)?;
-    Ok(out)
+    Ok(())
 }

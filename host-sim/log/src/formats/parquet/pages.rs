@@ -57,8 +57,8 @@ impl Pages {
         match &mut page {
             Page::DictionaryPage { buf, num_values, .. } => {
                 *buf = unpack(self.compression, buf)?;
-                // A number takes four bytes at least.
-                if *num_values as usize > buf.len() / 4 {
+                // A number takes two bytes at least.
+                if *num_values as usize > buf.len() / 2 {
                     let bytes = buf.len();
                     return refuse(format!(
                         "a dictionary of {bytes} bytes has no {num_values} values"

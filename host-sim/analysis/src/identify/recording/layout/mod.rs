@@ -11,8 +11,9 @@ mod points;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use haptic_log::formats::{self, Contents, Format, TimeColumn};
-use haptic_log::recording::{Group, Recording, Series};
+use haptic_log::formats::{self, Contents, Format, Reading};
+use haptic_log::recording::{Group, Recording, Series, Term};
+use haptic_log::units;
 use serde::Deserialize;
 
 use super::super::bus_trace;
@@ -121,8 +122,8 @@ impl Layout {
 
     /// Whether a file has all channels of this layout.
     #[must_use]
-    pub fn fits(&self, bytes: &[u8], format: Option<Format>) -> bool {
-        self.table(bytes, format, &[]).is_ok()
+    pub fn fits(&self, bytes: &[u8], format: Option<Format>, maps: &[Mapping]) -> bool {
+        self.table(bytes, format, maps).is_ok()
     }
 
     /// The log in a file's bytes: of the stretches by hand, or of those shared with an automation.
@@ -167,12 +168,8 @@ impl Layout {
                 values,
             })
         });
-        let group = Group {
-            name: String::new(),
-            channels: channels.collect(),
-            time_s,
-        };
-        let (mut log, mut notes) = of_channels(&Recording { groups: vec![group] }, &[], how)?;
+        let group = Group::new(time_s, channels.collect());
+        let (mut log, mut notes) = of_channels(Recording::of(group), &[], how)?;
         log.approximate_points = self.columns.contains_key("curvature_1pm");
         log.findings.extend(findings);
         notes.push(format!("Layout {}; {}, {}", self.name, self.source, self.licence));
@@ -218,6 +215,27 @@ impl Layout {
         Ok((time_s, table))
     }
 
+    /// Its columns, with what can be computed of them, as a recording.
+    ///
+    /// # Errors
+    /// As [`Layout::signals`].
+    pub fn recording(
+        &self,
+        bytes: &[u8],
+        format: Option<Format>,
+        maps: &[Mapping],
+    ) -> Result<Recording, LogError> {
+        let (time_s, mut table) = self.signals(bytes, format, maps)?;
+        two_points(&mut table, step_of(&time_s).0);
+        let channels = table.into_iter().map(|(name, values)| Series {
+            unit: units::of_name(&name).unwrap_or_default().into(),
+            source: self.name.clone(),
+            name,
+            values,
+        });
+        Ok(Recording::of(Group::new(time_s, channels.collect())))
+    }
+
     /// The time and the columns, those mapped by the caller in place of the layout's.
     fn table(
         &self,
@@ -225,46 +243,66 @@ impl Layout {
         format: Option<Format>,
         maps: &[Mapping],
     ) -> Result<(Vec<f64>, Table), LogError> {
-        let mut columns = self.columns.clone();
-        for map in maps {
-            if let Some(why) = self.never.get(&map.channel) {
-                return refuse(format!("channel {}: {why}", map.channel));
-            }
-            let scale = map.scale.unwrap_or(1.0);
-            columns.insert(NAMES[map.column].into(), format!("{}*{scale}", map.channel));
+        let mut columns: BTreeMap<&str, Vec<Term>> = BTreeMap::new();
+        for (name, text) in &self.columns {
+            let terms = text.split(" + ").map(str::parse).collect::<Result<_, _>>();
+            let terms = terms.map_err(|e: haptic_log::recording::RecordingError| {
+                format!("layout {}: {name} = {text:?}: {e}", self.name)
+            })?;
+            columns.insert(name, terms);
         }
-        let Some((time, scale)) = columns.remove("time_s").and_then(|text| term(&text)) else {
+        for map in maps {
+            if let Some(why) = self.never.get(&map.term.channel) {
+                return refuse(format!("channel {}: {why}", map.term.channel));
+            }
+            columns.insert(NAMES[map.column], vec![map.term.clone()]);
+        }
+        let times = columns.remove("time_s").unwrap_or_default();
+        let [time] = &times[..] else {
             return refuse(format!(
-                "layout {}: time_s is not given; --map time_s=CHANNEL*SCALE",
+                "layout {}: time_s is not given; --time CHANNEL*FACTOR",
                 self.name
             ));
-        };
-        let time = TimeColumn {
-            name: time,
-            scale: Some(scale),
         };
         let mut whole = self.headings.join(",").into_bytes();
         if !whole.is_empty() {
             whole.push(b'\n');
         }
         whole.extend_from_slice(bytes);
-        let contents = formats::read_bytes(whole, format.unwrap_or(Format::Csv), Some(&time));
+        let named = |name: &str, term: &Term| term.channel == name || units::bare(&term.channel) == name;
+        let is_wanted = |name: &str| {
+            named(name, time)
+                || columns
+                    .values()
+                    .flatten()
+                    .any(|term| named(name, term) || named(units::bare(name), term))
+        };
+        let reading = Reading {
+            time: Some(time),
+            only: Some(&is_wanted),
+        };
+        let contents = formats::read_bytes(whole, format.unwrap_or(Format::Csv), reading);
         let Contents::Channels(recording) = contents? else {
             return refuse("a table is wanted, this is a recording of the bus");
         };
         let mut table = Table::new();
-        for (name, text) in columns {
+        for (name, terms) in columns {
             let mut sum = Vec::new();
-            for part in text.split(" + ") {
-                let (channel, scale) = term(part)
-                    .ok_or_else(|| format!("layout {}: {name} = {text:?} is no CHANNEL*SCALE", self.name))?;
-                let (_, series) = recording.find(&channel)?;
+            for term in terms {
+                let (_, series) = recording.find(&term.channel)?;
+                let factor = match units::of_name(name) {
+                    Some(unit) => term.factor(series, unit)?,
+                    None => term.factor.unwrap_or(1.0),
+                };
                 sum.resize(series.values.len(), 0.0);
                 for (sum, value) in sum.iter_mut().zip(&series.values) {
-                    *sum += scale * value;
+                    *sum += factor * value;
                 }
             }
-            table.insert(name, sum);
+            table.insert(name.into(), sum);
+        }
+        if let Some(kmh) = table.remove("speed_kmh") {
+            table.insert(SPEED_COLUMN.into(), kmh.iter().map(|v| v / 3.6).collect());
         }
         let group = recording.groups.into_iter().next().unwrap_or_default();
         Ok((group.time_s, table))
@@ -281,15 +319,6 @@ fn step_of(time_s: &[f64]) -> (f64, f64) {
 fn renewed_s(signal: &[f64], dt_s: f64) -> f64 {
     let values = signal.chunk_by(|a, b| a == b).count();
     dt_s * signal.len() as f64 / values.max(1) as f64
-}
-
-/// `CHANNEL` or `CHANNEL*SCALE`.
-fn term(text: &str) -> Option<(String, f64)> {
-    let (channel, scale) = match text.rsplit_once('*') {
-        Some((channel, scale)) => (channel, scale.trim().parse().ok()?),
-        None => (text, 1.0),
-    };
-    Some((channel.trim().to_owned(), scale)).filter(|(channel, _)| !channel.is_empty())
 }
 
 #[cfg(test)]

@@ -44,8 +44,8 @@ pub(super) fn slopes(signal: &[f64], dt_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// e_y at the driver's near and e_theta at the far point, of a lane of this offset and curvature: the car moves towards its
-/// centre as the offset shrinks, and the lane is an arc.
+/// e_y at the driver's near and e_theta at the far point, of a lane of this offset, direction and curvature: the lane is an arc.
+/// Where its direction is not told, the car moves towards its centre as the offset shrinks.
 pub(super) fn two_points(table: &mut Table, dt_s: f64) {
     let column = |name: &str| table.get(name).map(Vec::as_slice);
     let (Some(offset), Some(curvature), Some(speed)) =
@@ -53,16 +53,22 @@ pub(super) fn two_points(table: &mut Table, dt_s: f64) {
     else {
         return;
     };
-    let points = |k: usize, slope: f64| {
+    let points = |k: usize, direction: f64| {
         let [near, far] = POINTS_S.map(|s| s * speed[k]);
-        let direction = slope / speed[k].max(1.0);
         let e_y = offset[k] + near * direction + 0.5 * curvature[k] * near * near;
         (e_y, direction + curvature[k] * far)
     };
-    let (e_y, e_theta) = slopes(offset, dt_s)
+    let direction: Vec<f64> = match column("lane_direction_rad") {
+        Some(told) => told.to_vec(),
+        None => {
+            let slopes = slopes(offset, dt_s).into_iter().zip(speed);
+            slopes.map(|(slope, speed)| slope / speed.max(1.0)).collect()
+        }
+    };
+    let (e_y, e_theta) = direction
         .into_iter()
         .enumerate()
-        .map(|(k, slope)| points(k, slope))
+        .map(|(k, direction)| points(k, direction))
         .unzip();
     table.insert("e_y_m".into(), e_y);
     table.insert("e_theta_rad".into(), e_theta);

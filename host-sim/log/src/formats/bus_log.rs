@@ -1,0 +1,195 @@
+//! A log of frames in one of the formats that hold frames, read frame by frame: a night of them fills a memory.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::dbc::Signals;
+use super::{Format, asc, blf, replaced};
+use crate::bus::{BusFrame, Intake, Take, interface};
+use crate::candump;
+use crate::notes::Notes;
+use crate::recording::{RecordingError, refuse};
+
+/// A log of frames.
+#[derive(Debug, Clone)]
+pub struct BusLog {
+    input: Input,
+    format: Format,
+    bus: Option<String>,
+    watch: Watch,
+}
+
+#[derive(Debug, Clone)]
+enum Input {
+    File(PathBuf),
+    Bytes(Arc<[u8]>),
+    Frames(Arc<[BusFrame]>),
+}
+
+/// Who is told of each part that is read, in bytes.
+#[derive(Clone)]
+struct Watch(Arc<dyn Fn(u64) + Send + Sync>);
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Watch")
+    }
+}
+
+/// An input whose reader is watched.
+struct Watched<'a, R>(R, &'a Watch);
+
+impl<R: Read> Read for Watched<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let read = self.0.read(buffer)?;
+        (self.1.0)(read as u64);
+        Ok(read)
+    }
+}
+
+impl BusLog {
+    fn new(input: Input, format: Format) -> Self {
+        Self {
+            input,
+            format,
+            bus: None,
+            watch: Watch(Arc::new(|_| ())),
+        }
+    }
+
+    /// The log in a file.
+    ///
+    /// # Errors
+    /// There is none, or it may not be read.
+    pub fn of_file(path: &Path, format: Format) -> Result<Self, RecordingError> {
+        File::open(path).map_err(refuse)?;
+        Ok(Self::new(Input::File(path.to_owned()), format))
+    }
+
+    /// The log in the bytes of a file of a format that holds frames.
+    #[must_use]
+    pub fn of_bytes(bytes: Vec<u8>, format: Format) -> Self {
+        Self::new(Input::Bytes(bytes.into()), format)
+    }
+
+    /// A log of frames that are known already.
+    #[must_use]
+    pub fn of_frames(frames: Vec<BusFrame>) -> Self {
+        Self::new(Input::Frames(frames.into()), Format::Candump)
+    }
+
+    /// The frames of one bus alone, by its name in the log; of all if there is none.
+    #[must_use]
+    pub fn of_bus(mut self, bus: Option<&str>) -> Self {
+        self.bus = bus.map(String::from);
+        self
+    }
+
+    /// Tells `watch` of each part that is read, in bytes.
+    #[must_use]
+    pub fn watched(mut self, watch: impl Fn(u64) + Send + Sync + 'static) -> Self {
+        self.watch = Watch(Arc::new(watch));
+        self
+    }
+
+    /// Its size, in bytes; 0 if nobody knows.
+    #[must_use]
+    pub fn size(&self) -> u64 {
+        match &self.input {
+            Input::File(path) => std::fs::metadata(path).map_or(0, |known| known.len()),
+            Input::Bytes(bytes) => bytes.len() as u64,
+            Input::Frames(_) => 0,
+        }
+    }
+
+    /// Reads every data frame, in the order of the log; what else it holds is counted.
+    ///
+    /// # Errors
+    /// Another kind of file; a clock that does not go on; no frame; what `take` says.
+    pub fn each(&self, take: &mut Take<'_>) -> Result<Notes, RecordingError> {
+        let read = match &self.input {
+            Input::File(path) => self.read(File::open(path).map_err(refuse)?, take),
+            Input::Bytes(bytes) => self.read(&bytes[..], take),
+            Input::Frames(frames) => {
+                let mut intake = Intake::new("frame", self.bus.as_deref(), take);
+                let mut each = frames.iter();
+                each.try_for_each(|frame| intake.frame(frame))
+                    .and_then(|()| intake.finish())
+            }
+        };
+        read.map_err(RecordingError::printable)
+    }
+
+    fn read(&self, input: impl Read, take: &mut Take<'_>) -> Result<Notes, RecordingError> {
+        let (mut input, bus) = (
+            BufReader::with_capacity(1 << 16, Watched(input, &self.watch)),
+            self.bus.as_deref(),
+        );
+        match self.format {
+            Format::Asc => asc::read(&mut input, bus, take),
+            Format::Blf => blf::read(&mut input, self.size(), bus, take),
+            _ => candump::read(&mut input, bus, take),
+        }
+    }
+
+    /// Every data frame at once, and what else the log holds.
+    ///
+    /// # Errors
+    /// As [`BusLog::each`].
+    pub fn frames(&self) -> Result<(Vec<BusFrame>, Notes), RecordingError> {
+        let mut frames = Vec::new();
+        let notes = self.each(&mut |frame: &BusFrame| {
+            frames.push(frame.clone());
+            Ok(())
+        })?;
+        Ok((frames, notes))
+    }
+}
+
+/// Writes the frames of a log into the file at `path`; how many there were, and what else the log holds.
+///
+/// # Errors
+/// A format of channels, what the disk says; with the file. What the log says.
+pub fn write_frames(path: &Path, log: &BusLog) -> Result<(u64, Notes), RecordingError> {
+    let format = Format::from_path(path)?;
+    let (mut count, mut notes) = (0, Notes::default());
+    let mut counted = |written: std::io::Result<()>| {
+        count += 1;
+        written.map_err(refuse)
+    };
+    replaced(path, |out| match format {
+        Format::Asc => {
+            let mut writer = asc::Writer::new(out);
+            notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
+            writer.numbers.tell(&mut notes);
+            writer.finish().map_err(refuse)
+        }
+        Format::Blf => {
+            let mut writer = blf::Writer::new(out).map_err(refuse)?;
+            notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
+            writer.numbers.tell(&mut notes);
+            writer.finish().map_err(refuse)
+        }
+        Format::Candump => {
+            let mut write =
+                |frame: &BusFrame| counted(candump::write_frame(out, &interface(&frame.bus), frame));
+            notes = log.each(&mut write)?;
+            Ok(())
+        }
+        _ => Err("frames become channels by a DBC file first".into()),
+    })?;
+    Ok((count, notes))
+}
+
+impl Signals<'_> {
+    /// Writes all channels into the CSV file at `path`, a row an instant, without a table in memory.
+    ///
+    /// # Errors
+    /// What the disk says, with the file; what the log says.
+    pub fn write_table(&self, path: &Path) -> Result<(), RecordingError> {
+        replaced(path, |out| self.write_csv(out))
+    }
+}
