@@ -109,7 +109,7 @@ fn as_it_is(bytes: Vec<u8>) -> Vec<u8> {
 /// All that a command makes of a table of channels. What takes many times as long as reading is done less often.
 fn use_channels(recording: &Recording, number: u64) {
     let _ = recording.table();
-    let _ = recording.resampled(if number.is_multiple_of(8) { 1000.0 } else { 1.0 });
+    let _ = recording.resampled(if number.is_multiple_of(8) { 1000.0 } else { 1.0 }, None);
     let _ = recording.clone().into_one_group();
 }
 

@@ -105,7 +105,7 @@ fn of_bus(
         eprintln!("{}: {count} frames", output.display());
         return Ok(None);
     }
-    let is_whole = arguments.rate.is_some() || arguments.reading.changes();
+    let is_whole = arguments.rate.is_some() || arguments.reading.renames();
     if is_whole || target.is_some_and(|format| format != Format::Csv) {
         return arguments.reading.channels(&arguments.input, log).map(Some);
     }

@@ -10,7 +10,7 @@ use super::dbc::Signals;
 use super::{Format, asc, blf, replaced};
 use crate::bus::{BusFrame, Intake, Take, interface};
 use crate::candump;
-use crate::notes::Notes;
+use crate::notes::{Fate, Notes, Part};
 use crate::recording::{RecordingError, refuse};
 
 /// A log of frames.
@@ -19,6 +19,8 @@ pub struct BusLog {
     input: Input,
     format: Format,
     bus: Option<String>,
+    /// Stretches of time that are wanted, s; all if there is none.
+    stretches: Vec<(f64, f64)>,
     watch: Watch,
 }
 
@@ -56,6 +58,7 @@ impl BusLog {
             input,
             format,
             bus: None,
+            stretches: Vec::new(),
             watch: Watch(Arc::new(|_| ())),
         }
     }
@@ -88,6 +91,13 @@ impl BusLog {
         self
     }
 
+    /// The frames of these stretches of time alone, s; of all time if there is none.
+    #[must_use]
+    pub fn within(mut self, stretches: &[(f64, f64)]) -> Self {
+        self.stretches = stretches.to_vec();
+        self
+    }
+
     /// Tells `watch` of each part that is read, in bytes.
     #[must_use]
     pub fn watched(mut self, watch: impl Fn(u64) + Send + Sync + 'static) -> Self {
@@ -110,6 +120,16 @@ impl BusLog {
     /// # Errors
     /// Another kind of file; a clock that does not go on; no frame; what `take` says.
     pub fn each(&self, take: &mut Take<'_>) -> Result<Notes, RecordingError> {
+        let mut outside = (0_u64, 0);
+        let mut within = |frame: &BusFrame| {
+            let is_in = |(from, to): &(f64, f64)| (*from..=*to).contains(&frame.time_s);
+            if !self.stretches.is_empty() && !self.stretches.iter().any(is_in) {
+                outside = (outside.0 + 1, if outside.0 == 0 { frame.line } else { outside.1 });
+                return Ok(());
+            }
+            take(frame)
+        };
+        let take = &mut within as &mut Take<'_>;
         let read = match &self.input {
             Input::File(path) => self.read(File::open(path).map_err(refuse)?, take),
             Input::Bytes(bytes) => self.read(&bytes[..], take),
@@ -120,7 +140,17 @@ impl BusLog {
                     .and_then(|()| intake.finish())
             }
         };
-        read.map_err(RecordingError::printable)
+        let mut notes = read.map_err(RecordingError::printable)?;
+        let (many, first) = outside;
+        let place = format_args!("line {first}");
+        notes.count_many(
+            Fate::LeftOut,
+            Part::Frame,
+            "outside of the time asked for",
+            many,
+            place,
+        );
+        Ok(notes)
     }
 
     fn read(&self, input: impl Read, take: &mut Take<'_>) -> Result<Notes, RecordingError> {
