@@ -12,7 +12,8 @@ use can_dbc::{
 use super::{BusLog, Only, csv};
 use crate::bus::{self, BusFrame};
 use crate::notes::{Fate, Notes, Part};
-use crate::recording::{Group, Line, Recording, RecordingError, Series, refuse};
+use crate::recording::grid::{Grid, OnGrid, Seen};
+use crate::recording::{Group, Line, Recording, RecordingError, Series, rate_hz, refuse};
 
 /// Identifier of a message, and whether it has 29 bits.
 #[must_use]
@@ -430,9 +431,7 @@ pub fn channels(log: &BusLog, dbc: &[u8], only: Only<'_>) -> Result<Recording, R
 struct Found {
     group: String,
     heading: Series,
-    /// First and last instant of a value.
-    span_s: [f64; 2],
-    samples: usize,
+    seen: Seen,
 }
 
 /// The channels of a log, whose values are read anew each time that they are needed: a night of them fills a memory.
@@ -454,18 +453,17 @@ impl<'a> Signals<'a> {
     /// As of [`channels`].
     pub fn of(log: &'a BusLog, dbc: &[u8]) -> Result<Self, RecordingError> {
         let (dbc, mut notes) = parse(dbc)?;
-        let mut spans: Vec<Vec<([f64; 2], usize)>> = Vec::new();
+        let mut seen: Vec<Vec<Seen>> = Vec::new();
         let (courses, read) = decode(log, &dbc, &mut |row: Row<'_>| {
-            if row.course == spans.len() {
-                spans.push(vec![([row.time_s; 2], 0); row.values.len()]);
+            if row.course == seen.len() {
+                seen.push(vec![Seen::default(); row.values.len()]);
             }
-            for (i, ((span_s, samples), value)) in spans[row.course].iter_mut().zip(row.values).enumerate() {
+            for (i, (seen, value)) in seen[row.course].iter_mut().zip(row.values).enumerate() {
                 let is_new = row.instead_of.is_none_or(|before| before[i].is_nan());
-                if value.is_nan() || !is_new {
-                    continue;
+                if is_new && !value.is_nan() {
+                    seen.take(row.time_s, *value);
                 }
-                *span_s = [if *samples == 0 { row.time_s } else { span_s[0] }, row.time_s];
-                *samples += 1;
+                seen.is_whole &= value.is_nan() || value.fract() == 0.0;
             }
             Ok(())
         })?;
@@ -477,16 +475,11 @@ impl<'a> Signals<'a> {
         for course in order {
             places[course] = channels.len();
             let signals = dbc.messages[courses[course].message].signals.iter();
-            channels.extend(
-                signals
-                    .zip(&spans[course])
-                    .map(|(signal, (span_s, samples))| Found {
-                        group: names[course].clone(),
-                        heading: heading(&dbc, &courses[course], signal),
-                        span_s: *span_s,
-                        samples: *samples,
-                    }),
-            );
+            channels.extend(signals.zip(&seen[course]).map(|(signal, seen)| Found {
+                group: names[course].clone(),
+                heading: heading(&dbc, &courses[course], signal),
+                seen: seen.clone(),
+            }));
         }
         Ok(Self {
             log,
@@ -501,14 +494,13 @@ impl<'a> Signals<'a> {
     #[must_use]
     pub fn table(&self) -> Vec<Line> {
         let line = |channel: &Found| {
-            let [first, last] = channel.span_s;
-            let steps = channel.samples.saturating_sub(1) as f64;
+            let Seen { span_s, samples, .. } = channel.seen;
             Line {
                 name: self.name(channel),
                 unit: channel.heading.unit.clone(),
                 source: channel.heading.source.clone(),
-                sample_rate_hz: if last > first { steps / (last - first) } else { 0.0 },
-                samples: channel.samples,
+                sample_rate_hz: rate_hz(samples, span_s[1] - span_s[0]),
+                samples,
             }
         };
         self.channels.iter().map(line).collect()
@@ -526,6 +518,46 @@ impl<'a> Signals<'a> {
             1 => name.clone(),
             _ => format!("{}.{name}", channel.group),
         }
+    }
+
+    /// All channels on an even grid, as [`Recording::resampled`] makes it.
+    ///
+    /// # Errors
+    /// As there; as of [`channels`].
+    pub fn resampled(&self, rate_hz: f64, longest_s: Option<f64>) -> Result<Group, RecordingError> {
+        let names: Vec<String> = self.channels.iter().map(|channel| self.name(channel)).collect();
+        let found = || {
+            names
+                .iter()
+                .zip(&self.channels)
+                .filter(|(_, channel)| channel.seen.samples > 0)
+        };
+        let grid = Grid::over(
+            found().map(|(name, channel)| (&name[..], &channel.seen)),
+            rate_hz,
+            longest_s,
+        )?;
+        let course = |channel: &Found| {
+            let name = &channel.heading.name;
+            let mut same = self.channels.iter().filter(|other| other.heading.name == *name);
+            OnGrid::new(same.all(|other| other.seen.is_whole))
+        };
+        let mut courses: Vec<OnGrid> = self.channels.iter().map(course).collect();
+        decode(self.log, &self.dbc, &mut |row: Row<'_>| {
+            let own = courses[self.places[row.course]..].iter_mut().zip(row.values);
+            for (course, value) in own.filter(|(_, value)| !value.is_nan()) {
+                course.take(&grid, row.time_s, *value);
+            }
+            Ok(())
+        })?;
+        let channels = names.iter().zip(&self.channels).zip(courses);
+        let channels = channels.filter(|((_, channel), _)| channel.seen.samples > 0);
+        let channels = channels.map(|((name, channel), course)| Series {
+            name: name.clone(),
+            values: course.finish(&grid),
+            ..channel.heading.clone()
+        });
+        Ok(Group::new(grid.instants(), channels.collect()))
     }
 
     /// Writes all channels as a CSV file, a row an instant. Rows wait until no earlier one can come.
