@@ -157,3 +157,169 @@ fn a_parquet_file_of_polars_is_listed_with_its_units() {
         ]
     );
 }
+
+/// A drive of 12 s whose columns are called otherwise: degrees, milliseconds and km/h, by the names' brackets or by nothing.
+fn foreign(directory: &Path) {
+    let mut text = String::from("clock,lane,Heading,steer,tg,td,v,event\n");
+    for k in 0..1200_u32 {
+        let x = f64::from(k % 50) * 1e-3;
+        writeln!(
+            text,
+            "{},{x},{},{x},{x},{},198,mark",
+            10 * k,
+            10.0 * x,
+            f64::from(k % 7) * 0.1
+        )
+        .unwrap();
+    }
+    std::fs::write(directory.join("rec.csv"), text).unwrap();
+}
+
+const NAMES: [&str; 12] = [
+    "--time",
+    "clock [ms]",
+    "--map",
+    "e_y_m=lane",
+    "--map",
+    "e_theta_rad=Heading [deg]",
+    "--map",
+    "wheel_angle_rad=steer",
+    "--map",
+    "guidance_torque_nm=tg",
+    "--map",
+    "driver_torque_nm=td",
+];
+
+/// 10 ms, and 0.49 deg, which is 0.008552113334772215 rad.
+#[test]
+fn one_set_of_options_reads_a_recording_in_every_command() {
+    let directory = tempfile::tempdir().unwrap();
+    foreign(directory.path());
+    let convert = [
+        &["convert", "rec.csv", "out.csv", "--from", "1", "--to", "2"],
+        &NAMES[..],
+    ]
+    .concat();
+    let output = host_sim(directory.path(), &convert);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("note: 1 channel (event) left out: text"), "{said}");
+    let text = std::fs::read_to_string(directory.path().join("out.csv")).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next(),
+        Some("time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm,driver_torque_nm,v")
+    );
+    let rows: Vec<Vec<f64>> = lines
+        .map(|line| line.split(',').map(|x| x.parse().unwrap()).collect())
+        .collect();
+    assert_eq!((rows.len(), rows[0][0], rows[100][0]), (101, 1.0, 2.0));
+    assert!(
+        (rows[49][2] - 0.008_552_113_334_772_215).abs() < 1e-15,
+        "{}",
+        rows[49][2]
+    );
+
+    let found = identified(
+        directory.path(),
+        &[&["rec.csv", "--map", "speed_kmh=v"], &NAMES[..]].concat(),
+    );
+    let notes = found["notes"].to_string();
+    assert!(
+        notes.contains("e_theta_rad is Heading [deg] times 0.01745"),
+        "{notes}"
+    );
+    assert!(
+        notes.contains("The speed goes up to 55.0 m/s, which is 198 km/h"),
+        "{notes}"
+    );
+
+    let drivers = [&["drivers", "rec.csv", "rec.csv"], &NAMES[..]].concat();
+    assert_eq!(host_sim(directory.path(), &drivers).status.code(), Some(0));
+    for (wrong, says) in [
+        (
+            "e_theta_rad=Heading [parsec]",
+            "rec.csv: channel Heading: its unit \"parsec\" is not known as one of rad",
+        ),
+        (
+            "e_theta_rad=event",
+            "rec.csv: there is no channel event: it was left out (text)",
+        ),
+        ("speed_m_per_s=v*0", "--map speed_m_per_s=v*0: the factor \"0\""),
+    ] {
+        let output = host_sim(
+            directory.path(),
+            &[
+                "identify",
+                "rec.csv",
+                "--time",
+                "clock [ms]",
+                "--map",
+                "e_y_m=lane",
+                "--map",
+                wrong,
+            ],
+        );
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && said.contains(says), "{said}");
+    }
+}
+
+/// A name of 70 characters does not fit into a MAT file: what was there stays, and nothing lies beside it.
+#[test]
+fn a_file_that_cannot_be_written_stays_as_it_was() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(
+        directory.path().join("long.csv"),
+        format!("time_s,{}\n0,1\n1,2\n", "x".repeat(70)),
+    )
+    .unwrap();
+    std::fs::write(directory.path().join("good.mat"), "good").unwrap();
+    let output = host_sim(directory.path(), &["convert", "long.csv", "good.mat", "--force"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.code() == Some(2) && said.contains("at most 63 characters"),
+        "{said}"
+    );
+    assert_eq!(
+        std::fs::read_to_string(directory.path().join("good.mat")).unwrap(),
+        "good"
+    );
+    assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn what_is_mistyped_or_empty_is_answered_with_what_is_meant() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("condition.toml", "condition = 'hihg'\n");
+    write("table.toml", "[drivr]\nk_hg = 0.3\n");
+    write("field.toml", "[driver]\nk_gh = 0.3\n");
+    write("both.toml", "speed_kmh = 60\nspeed_m_per_s = 16\n");
+    write("empty", "");
+    for (arguments, says) in [
+        (&["run", "condition.toml"][..], "did you mean high?"),
+        (&["run", "table.toml"], "did you mean driver?"),
+        (&["run", "field.toml"], "did you mean k_hg?"),
+        (
+            &["run", "both.toml"],
+            "one of speed_m_per_s, speed_kmh and a table [speed]",
+        ),
+        (
+            &["run", "empty"],
+            "empty: it is empty; an empty scenario ends in .toml",
+        ),
+        (
+            &["faults", "--rows", "driver-torque-frozn"],
+            "did you mean driver-torque-frozen?",
+        ),
+        (&["faults", "--world", "breaking"], "did you mean braking?"),
+    ] {
+        let output = host_sim(directory.path(), arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            output.status.code() == Some(2) && said.contains(says),
+            "{arguments:?}: {said}"
+        );
+    }
+}

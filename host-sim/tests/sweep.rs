@@ -127,3 +127,21 @@ fn a_row_is_driven_again_by_one_command() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("--replay = 200 is outside 0 to 199"));
 }
+
+#[test]
+fn shards_that_begin_together_all_drive() {
+    let folder = folder();
+    for round in ["a", "b", "c"] {
+        let shard = |i: u32| command(folder.path(), &["--out", round, "--shard", &format!("{i}/4")]).spawn();
+        let children: Vec<_> = (1..=4).map(|i| shard(i).unwrap()).collect();
+        for child in children {
+            let output = child.wait_with_output().unwrap();
+            assert!(
+                output.status.success(),
+                "{}",
+                String::from_utf8_lossy(&output.stderr)
+            );
+        }
+        assert!(folder.path().join(round).join("drives.csv").exists());
+    }
+}

@@ -4,3 +4,4 @@ mod buses;
 mod channels;
 mod formats;
 mod parquet;
+mod tables;

@@ -107,7 +107,7 @@ impl Budget {
     pub(super) fn inflated_as_far(&mut self, compressed: &[u8]) -> Result<(Vec<u8>, bool), RecordingError> {
         let flags = PARSE_ZLIB_HEADER | COMPUTE_ADLER32 | USING_NON_WRAPPING_OUTPUT_BUF;
         let mut state = DecompressorOxide::new();
-        let mut out = vec![0; compressed.len().saturating_mul(4).clamp(1, self.bytes)];
+        let mut out = vec![0; compressed.len().saturating_mul(4).max(64).min(self.bytes)];
         let (mut used, mut made) = (0, 0);
         let is_whole = loop {
             // The call that returns a vector leaves what it has not made as zeros at its end.

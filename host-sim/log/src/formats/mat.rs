@@ -200,33 +200,43 @@ pub(super) fn read(file: &[u8], time: Option<&Term>) -> Result<Table, RecordingE
             }
         }
     }
-    let said = |fields: &[(String, Value)], name: &str| match fields.iter().find(|(field, _)| field == name) {
-        Some((_, Value::Text(text))) => text.clone(),
-        _ => String::new(),
-    };
     for column in &mut columns {
         column.unit = said(&units, &column.name);
         column.source = said(&sources, &column.name);
     }
-    // The time decides which vectors are channels; without it the longest one does.
-    let wanted = time.map_or("time_s", |time| time.channel.as_str());
-    let time = columns
-        .iter()
-        .find(|c| c.name == wanted || c.name == units::bare(wanted));
-    let longest = || columns.iter().map(|c| c.values.len()).max().unwrap_or(0);
-    let rows = time.map_or_else(longest, |c| c.values.len());
-    for column in columns {
-        let why = match column.values.len() {
-            own if own == rows => {
-                found.columns.push(column);
-                continue;
-            }
-            0 | 1 => "a single value, or none".to_owned(),
-            _ => format!("other length than the {rows} values of the time"),
-        };
-        found.notes.channel(Fate::LeftOut, column.name, &why);
-    }
+    found.keep(columns, time);
     Ok(found)
+}
+
+/// What a struct of texts says of a channel.
+fn said(fields: &[(String, Value)], name: &str) -> String {
+    match fields.iter().find(|(field, _)| field == name) {
+        Some((_, Value::Text(text))) => text.clone(),
+        _ => String::new(),
+    }
+}
+
+impl Table {
+    /// Keeps the vectors that are as long as the time, or where there is none as the longest.
+    fn keep(&mut self, columns: Vec<Series>, time: Option<&Term>) {
+        let wanted = time.map_or("time_s", |time| time.channel.as_str());
+        let time = columns
+            .iter()
+            .find(|c| c.name == wanted || c.name == units::bare(wanted));
+        let longest = || columns.iter().map(|c| c.values.len()).max().unwrap_or(0);
+        let rows = time.map_or_else(longest, |c| c.values.len());
+        for column in columns {
+            let why = match column.values.len() {
+                own if own == rows => {
+                    self.columns.push(column);
+                    continue;
+                }
+                0 | 1 => "a single value, or none".to_owned(),
+                _ => format!("other length than the {rows} values of the time"),
+            };
+            self.notes.channel(Fate::LeftOut, column.name, &why);
+        }
+    }
 }
 
 fn put(out: &mut Vec<u8>, kind: u32, contents: &[u8]) -> Result<(), RecordingError> {

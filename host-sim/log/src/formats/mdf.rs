@@ -270,7 +270,7 @@ fn conversion(
             let other = Box::new(other);
             Conversion::Ranges { rows, other }
         }
-        (9 | 10 | 11, _) => return Ok(Err("text")),
+        (9..=11, _) => return Ok(Err("text")),
         _ => return Ok(Err("a conversion that is not known")),
     }))
 }
@@ -673,7 +673,10 @@ impl Found<'_> {
             varying,
             ..
         } = open;
-        let place = format!("group {name:?}");
+        let place = match name.as_str() {
+            "" => "a group without a name".to_owned(),
+            _ => format!("group {name:?}"),
+        };
         if rows > count {
             let why = format!("behind the {count} rows that its group has");
             self.notes

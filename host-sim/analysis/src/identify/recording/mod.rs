@@ -227,34 +227,15 @@ fn of_channels(
         };
         let scale = factor(series, i, map)?;
         if scale != 1.0 {
-            notes.push(converted(series, i, scale));
+            notes.push(converted(series, i, map, scale));
         }
         *column = Some(Column { group, series, scale });
     }
     if let Some(error) = missing.iter().find_map(|name| recording.notes.left_out(name)) {
         return Err(error.into());
     }
-    match missing[..] {
-        [] => {}
-        [name] => {
-            let error = recording
-                .find(name)
-                .map(drop)
-                .err()
-                .map_or(String::new(), |e| e.to_string());
-            return refuse(format!("{error}; --map {name}=CHANNEL names another one"));
-        }
-        _ => {
-            let with_near = |name: &&str| match recording.like(name).first() {
-                Some(near) => format!("{name} (there is {near})"),
-                None => (*name).to_owned(),
-            };
-            let names: Vec<String> = missing.iter().map(with_near).collect();
-            let names = names.join(", ");
-            return refuse(format!(
-                "there are no channels {names}; --map NAME=CHANNEL names others"
-            ));
-        }
+    if !missing.is_empty() {
+        return refuse(are_missing(recording, &missing));
     }
     let nowhere = Lines::default();
     let one = columns
@@ -274,6 +255,22 @@ fn of_channels(
     Ok((log, notes))
 }
 
+/// Which columns a recording lacks, with what is like them.
+fn are_missing(recording: &Recording, names: &[&str]) -> String {
+    if let [name] = names
+        && let Err(error) = recording.find(name)
+    {
+        return format!("{error}; --map {name}=CHANNEL names another one");
+    }
+    let with_near = |name: &&str| match recording.like(name).first() {
+        Some(near) => format!("{name} (there is {near})"),
+        None => (*name).to_owned(),
+    };
+    let names: Vec<String> = names.iter().map(with_near).collect();
+    let names = names.join(", ");
+    format!("there are no channels {names}; --map NAME=CHANNEL names others")
+}
+
 /// What a channel's values are multiplied by to be a column's.
 fn factor(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, RecordingError> {
     let own = || Term {
@@ -284,11 +281,12 @@ fn factor(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, 
     term.factor(series, UNITS[column])
 }
 
-fn converted(series: &Series, column: usize, scale: f64) -> String {
-    format!(
-        "{} is {} ({:?}) times {scale}",
-        NAMES[column], series.name, series.unit
-    )
+fn converted(series: &Series, column: usize, map: Option<&Mapping>, scale: f64) -> String {
+    let said = map.map(|map| map.term.channel.as_str());
+    let said = said.filter(|said| units::in_brackets(said).is_some());
+    let own = || format!("{} ({:?})", series.name, series.unit);
+    let channel = said.map_or_else(own, str::to_owned);
+    format!("{} is {channel} times {scale}", NAMES[column])
 }
 
 /// What the recording says of the speed, if it does. It is not needed: without a mapping another unit or name tells nothing.
@@ -318,7 +316,7 @@ fn tell_speed(
         Err(error) => return Err(error.into()),
     };
     if scale != 1.0 {
-        notes.push(converted(series, column, scale));
+        notes.push(converted(series, column, map, scale));
     }
     let m_per_s = units::factor(UNITS[column], "m/s").unwrap_or(1.0);
     let speeds: Vec<f64> = series.values.iter().map(|v| v * scale * m_per_s).collect();
