@@ -50,7 +50,7 @@ fn frames() -> Vec<BusFrame> {
             _ => Form::Classic,
         },
         sent: k.is_multiple_of(4),
-        data: (0..if k % 9 == 0 { 64 } else { k as u8 % 9 }).collect(),
+        data: (0..if k.is_multiple_of(9) { 64 } else { k as u8 % 9 }).collect(),
     };
     (0..2000).map(frame).collect()
 }
