@@ -53,3 +53,42 @@ fn a_line_that_slides_faster_than_the_bound_is_found_and_a_slower_one_is_not() {
         }
     }
 }
+
+/// A whole vehicle that is invented, in a bend in which guidance carries all of the aligning torque, so that nothing contradicts it; its
+/// driver torque moves by so much to and fro, N.m. When guidance warns of hands that are off, and when it ends, s.
+fn phantom(dither_nm: f64, sign: f64) -> [Option<u32>; 2] {
+    let mut rig = Rig::paper();
+    rig.curve(2.0 * sign);
+    rig.yaw_rate = Some(rig.lane.e_theta.rad() / 0.7);
+    rig.run(600);
+    rig.engage = true;
+    let [mut warned, mut ended] = [None; 2];
+    for ms in 0..60_000_u32 {
+        rig.driver = Some(if ms / 50 % 2 == 0 { dither_nm } else { -dither_nm });
+        let step = rig.tick();
+        if step.command.faults.contains(Fault::HandsOff) {
+            warned.get_or_insert(ms / 1000);
+        }
+        if step.command.mode != Mode::Active {
+            ended.get_or_insert(ms / 1000);
+        } else if ended.is_none() && ms > 3000 {
+            assert!((rig.applied - 2.0 * sign).abs() < 0.02, "{} N.m", rig.applied);
+        }
+    }
+    [warned, ended]
+}
+
+/// Hands whose torque changes by no more than 0.08 N.m are off: a warning after 15 s, the end after 30 s. What moves more is a hand.
+#[test]
+fn an_invented_vehicle_is_bounded_by_the_hands_alone() {
+    for sign in [1.0, -1.0] {
+        for (dither_nm, warned_s, ended_s) in [(0.01, 15, 30), (0.035, 15, 30)] {
+            assert_eq!(
+                phantom(dither_nm, sign),
+                [Some(warned_s), Some(ended_s)],
+                "{dither_nm}"
+            );
+        }
+        assert_eq!(phantom(0.05, sign), [None, None]);
+    }
+}
