@@ -410,6 +410,10 @@ fn the_monitor_learns_the_period_of_the_camera() {
         let slower = watching(sign, 0, &[(8, 6), (33, 2)]);
         assert_eq!(claimed(slower, sign, 0, said, [33, 33]), 32 + 20);
         assert_eq!(claimed(slower, sign, 0, said, [82, 33]), 81 + 20);
+        // A lost picture of the slowest camera makes no slower one.
+        let slowest = watching(sign, 0, &[(66, 6), (132, 1), (66, 1)]);
+        assert_eq!(claimed(slowest, sign, 0, said, [166, 66]), 165 + 20);
+        assert!(claimed(slowest, sign, 0, said, [168, 66]) > 600);
         let back = watching(sign, 0, &[(8, 6), (1000, 1), (8, 1)]);
         assert_eq!(claimed(back, sign, 0, said, [8, 8]), 7 + 20);
         // 33 ms, of which 8 + 25/e are left after 64 pictures, and next to nothing after 400.

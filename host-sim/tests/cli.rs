@@ -260,8 +260,8 @@ fn studies_leave_their_pictures_when_asked() {
     }
 }
 
-/// Who jerks the wheel works against the guidance: the law that notices it leaves less. `trial::tests` has what is printed to run a
-/// failure again.
+/// Who jerks the wheel works against the guidance, and the law that notices it makes another drive of it. `trial::tests` has what is printed
+/// to run a failure again.
 #[test]
 fn the_faults_are_driven_with_the_law_that_is_asked_for() {
     let directory = tempfile::tempdir().unwrap();
@@ -278,7 +278,7 @@ fn the_faults_are_driven_with_the_law_that_is_asked_for() {
     assert_eq!(activity["law"], "driver_activity");
     let peak_nm = |told: &Value| told["rows"][0]["peak_torque_nm"].as_f64().unwrap();
     assert!(
-        peak_nm(&activity) < peak_nm(&paper) - 0.01,
+        (peak_nm(&activity) - peak_nm(&paper)).abs() > 0.01,
         "{} {}",
         peak_nm(&activity),
         peak_nm(&paper)

@@ -153,7 +153,10 @@ fn every_bad_field_is_named_with_its_value_and_range() {
             "[guidance]\nlaw = 1.5",
             "guidance.law = 1.5 is not a whole number from 0 to 1",
         ),
-        ("[guidance]\nlaw = 3", "guidance.law = 3 is outside 0 to 1"),
+        (
+            "[guidance]\nlaw = 3",
+            "guidance.law = 3 is not a whole number from 0 to 1",
+        ),
         ("[failure]\ntime_s = -3", "failure.time_s = -3"),
         ("[driver_change]\ntime_s = 3\nk_d_nm_per_rad = 2", "k_hg"),
         (
