@@ -304,3 +304,29 @@ fn rejections_are_told_pair_by_pair() {
         }
     }
 }
+
+/// A whole simulated vehicle on the bus, in a bend that asks for 2 N.m, whose driver torque moves by so much to and fro. Within
+/// 0.08 N.m nobody's hand is there: warned after 15 s, over after 30 s. A larger one passes for a hand, and only the limits bound it.
+#[test]
+fn a_phantom_vehicle_whose_driver_torque_dithers_lasts_for_thirty_seconds() {
+    for (dither_nm, ends) in [(0.01, true), (0.1, false)] {
+        let mut rig = Rig::active_in_curve(2.0);
+        let (mut warned_s, mut ended_s) = (None, None);
+        for ms in 0..40_000_u32 {
+            let sign = if ms / 2 % 2 == 0 { 1.0 } else { -1.0 };
+            rig.driver = Some(sign * dither_nm);
+            let command = rig.tick().command;
+            assert!(rig.applied.abs() < 2.05, "{} N.m", rig.applied);
+            if command.warning {
+                warned_s.get_or_insert(f64::from(ms) * 1e-3);
+            }
+            if command.mode != Mode::Active {
+                ended_s.get_or_insert(f64::from(ms) * 1e-3);
+            }
+        }
+        println!("+-{dither_nm} N.m: warned after {warned_s:?} s, over after {ended_s:?} s");
+        let within = |at_s: Option<f64>, most_s: f64| at_s.is_some_and(|at_s| at_s < most_s);
+        assert_eq!(within(warned_s, 15.1) && within(ended_s, 30.1), ends);
+        assert_eq!(ended_s.is_some(), ends);
+    }
+}

@@ -56,6 +56,10 @@ const TESTS: &[(&str, &[&str])] = &[
         &["ecu", "memory", "probe", "edges", "endurance", "attacks"],
     ),
     ("ecu/another_law", &["another_law"]),
+    (
+        "ecu/counting",
+        &["interleaved", "honest", "attacks", "senders", "reference"],
+    ),
     ("ecu/injection", &["ecu", "memory", "monitor", "edges"]),
     (
         "ecu/receivers",

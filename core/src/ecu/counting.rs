@@ -144,11 +144,21 @@ impl Counting {
 
     /// Takes a frame that is out of order, `ahead` counts modulo 16 from the last. `true`: it is one too many, and there are two
     /// senders.
-    pub(super) fn is_contradicted(&mut self, ahead: u8, frame: &Frame) -> bool {
+    pub(super) fn is_contradicted(
+        &mut self,
+        ahead: u8,
+        frame: &Frame,
+        now: Instant,
+        periods: &Periods,
+    ) -> bool {
+        // More frames were lost than one may be ahead: as many as fit into the time.
+        let per_count = (self.pace.us() / 2).max(periods.fastest.us());
+        let lost_us = per_count.saturating_mul(u32::from(ahead));
+        let is_lost = ahead > 0 && lost_us <= now.since(self.heard).us();
         let marks = &mut self.marks;
         let is_again = ahead == 0 && words_of(frame) == self.last;
         let is_late = ahead == 15 && marks.is_one_missing != 0;
-        if is_again || is_late {
+        if is_again || is_late || is_lost {
             marks.is_one_missing = 0;
             return false;
         }

@@ -160,7 +160,7 @@ impl<T: Words> Slot<T> {
                 }
             }
             Some(ahead) => {
-                if self.counting.is_contradicted(ahead, frame) {
+                if self.counting.is_contradicted(ahead, frame, now, periods) {
                     (self.state, self.doubt, self.e2e) = (LOST, 0, ReceiverState::NEW);
                 }
             }

@@ -170,6 +170,11 @@ impl<T: Copy> Sender<T> {
             }
             Some(0) if data == counting.last => counting.skipped = false,
             Some(15) if counting.skipped => counting.skipped = false,
+            Some(ahead)
+                if ahead > 0 && ahead * self.fastest_us.max(counting.pace_us / 2) <= now - counting.at =>
+            {
+                counting.skipped = false;
+            }
             Some(_) => {
                 counting.against += 8;
                 is_one_too_many = counting.against >= 128;

@@ -172,23 +172,16 @@ pub const WORLDS: [WorldKind; 20] = [
         "everything, and lane changes by hand of which nobody is told, 22 an hour",
         &[Part::LaneChanges],
     ),
-    more(
-        "fades",
-        "everything, and a yaw rate that dies within 1 to 10 s beside a speed that drifts, 6 times an hour",
-        &[Part::Fades],
-    ),
     more("gusts", "everything, and gusts to 1 kN within 0.3 s", &[Gusts]),
     more(
         "events",
-        "everything, blinks, slips, works, lane changes, fades and gusts together",
-        &[
-            Gusts,
-            Part::Blinks,
-            Part::Slips,
-            Part::Works,
-            Part::LaneChanges,
-            Part::Fades,
-        ],
+        "everything, blinks, slips, works, lane changes and gusts together",
+        &[Gusts, Part::Blinks, Part::Slips, Part::Works, Part::LaneChanges],
+    ),
+    beyond(
+        "fades",
+        "everything, and a yaw rate that dies within 1 to 10 s beside a speed that drifts, 6 times an hour",
+        &[Part::Fades],
     ),
     beyond(
         "no-yaw-rate",
