@@ -24,6 +24,7 @@ use std::sync::Once;
 use haptic_analysis::identify::{HAPTIC_DBC, Recording as How, of_bytes};
 use haptic_batch::sweep::Sweep;
 use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
+use haptic_log::notes::Notes;
 use haptic_log::recording::Recording;
 use haptic_log::trace::Trace;
 use haptic_sim::input::InputError;
@@ -109,7 +110,7 @@ fn as_it_is(bytes: Vec<u8>) -> Vec<u8> {
 /// All that a command makes of a table of channels. What takes many times as long as reading is done less often.
 fn use_channels(recording: &Recording, number: u64) {
     let _ = recording.table();
-    let _ = recording.resampled(if number.is_multiple_of(8) { 1000.0 } else { 1.0 });
+    let _ = recording.resampled(if number.is_multiple_of(8) { 1000.0 } else { 1.0 }, None);
     let _ = recording.clone().into_one_group();
 }
 
@@ -194,7 +195,7 @@ fn parquet() {
 
 #[test]
 fn dbc() {
-    let log = BusLog::of_frames(seeds::frames(40));
+    let log = BusLog::of_frames(seeds::frames(40), Notes::default());
     fuzz("dbc", &seeds::dbc(), as_it_is, |bytes, number| {
         if let Ok(recording) = formats::dbc::channels(&log, bytes, None) {
             use_channels(&recording, number);
@@ -268,7 +269,12 @@ fn the_seeds_are_good() {
     let compressed = seeds::compressed_mat(seeds::table("mat").remove(0));
     assert!(of_bytes(compressed, Some(Format::Mat), None, &[], &how).is_ok());
     assert!(
-        formats::dbc::channels(&BusLog::of_frames(seeds::frames(40)), HAPTIC_DBC.as_bytes(), None).is_ok()
+        formats::dbc::channels(
+            &BusLog::of_frames(seeds::frames(40), Notes::default()),
+            HAPTIC_DBC.as_bytes(),
+            None
+        )
+        .is_ok()
     );
     for text in seeds::opendrive() {
         let text = String::from_utf8(text).unwrap();

@@ -1,6 +1,7 @@
 //! What is nested deeper than a stack is high: refused or read, and the process lives.
 
 use haptic_log::formats::{BusLog, Format, Reading, read_bytes};
+use haptic_log::notes::Notes;
 use haptic_sim::models::road::{Course, LaneChoice};
 
 use crate::seeds;
@@ -30,8 +31,12 @@ fn a_scenario_is_nested() {
 fn a_dbc_file_is_nested() {
     let text = seeds::SMALL_DBC.replace("(0.001,", &"(".repeat(DEEP));
     assert!(
-        haptic_log::formats::dbc::channels(&BusLog::of_frames(seeds::frames(4)), text.as_bytes(), None)
-            .is_err()
+        haptic_log::formats::dbc::channels(
+            &BusLog::of_frames(seeds::frames(4), Notes::default()),
+            text.as_bytes(),
+            None
+        )
+        .is_err()
     );
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use haptic_analysis::identify::HAPTIC_DBC;
 use haptic_log::bus::BusFrame;
 use haptic_log::formats::{self, BusLog};
+use haptic_log::notes::Notes;
 use haptic_log::recording::{Group, Recording, Series};
 use haptic_log::trace::{Sample, Trace};
 use haptic_sim::models::driver::DriverParameters;
@@ -143,7 +144,7 @@ pub(crate) fn bus(extension: &str) -> Vec<Vec<u8>> {
     }
     let write = |frames: &[BusFrame]| {
         written(extension, |path| {
-            formats::write_frames(path, &BusLog::of_frames(frames.to_vec())).unwrap();
+            formats::write_frames(path, &BusLog::of_frames(frames.to_vec(), Notes::default())).unwrap();
         })
     };
     let mut seeds = vec![write(&frames(12)), write(&frames(60)), write(&drive)];
@@ -207,7 +208,7 @@ pub(crate) fn blf_objects() -> Vec<Vec<u8>> {
 /// A BLF file of objects: in a container, deflated or not, or as they are.
 pub(crate) fn blf_file(objects: Vec<u8>) -> Vec<u8> {
     let mut file = written("blf", |path| {
-        formats::write_frames(path, &BusLog::of_frames(frames(1))).unwrap();
+        formats::write_frames(path, &BusLog::of_frames(frames(1), Notes::default())).unwrap();
     });
     file.truncate(144);
     let container = |method: u8, inside: &[u8]| {

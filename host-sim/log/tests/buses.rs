@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use haptic_log::bus::BusFrame;
 use haptic_log::formats::dbc::{self, Signals};
 use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
 use haptic_log::notes::Note;
@@ -147,6 +148,26 @@ fn every_bus_is_a_group_of_its_own() {
     let found = read("dupname.log", "dupname.dbc").unwrap();
     assert_eq!(course(&found, "Wheel_0x010.Angle"), [(0.0, 10.0)]);
     assert_eq!(course(&found, "Wheel_0x011.Angle"), [(0.1, 20.0)]);
+}
+
+#[test]
+fn a_stretch_of_a_log_is_cut_as_it_is_read() {
+    let whole = log("two.log", file("two.log")).within(&[(0.01, 0.02), (0.05, f64::INFINITY)]);
+    let found = dbc::channels(&whole, &file("one.dbc"), None).unwrap();
+    let instants: Vec<f64> = course(&found, "can0.STEER.Torque")
+        .into_iter()
+        .map(|(time_s, _)| time_s)
+        .collect();
+    assert_eq!(instants, [0.01, 0.02, 0.05]);
+    assert_eq!(
+        notes(&found),
+        ["7 frames left out: outside of the time asked for, the first in line 1"]
+    );
+    let none = dbc::channels(&whole.within(&[(5.0, 6.0)]), &file("one.dbc"), None);
+    assert_eq!(
+        none.unwrap_err().to_string(),
+        "there is no frame in the stretches of --from and --to"
+    );
 }
 
 /// Interfaces of other names are numbered where a format numbers its channels, and no two become one.
@@ -364,15 +385,17 @@ fn a_cut_file_is_read_to_the_cut() {
             "{length}"
         );
     }
-    // Damage in the middle of the first of two containers: the second is read.
-    let mut two = file("cut.blf");
-    two.extend_from_slice(&[]);
-    let first = u32::from_le_bytes(two[152..156].try_into().unwrap()) as usize;
-    two[200] ^= 0xFF;
-    two.truncate(144 + first + first % 4);
-    two.extend_from_slice(&whole[144..]);
+    // The first of two containers is damaged: the second is read.
+    let (mut two, second) = (whole, file("fdclassic101.blf"));
+    two[176] ^= 0xFF;
+    two.extend_from_slice(&second[144..]);
     let (frames, told) = log("x.blf", two).frames().unwrap();
-    assert!(frames.iter().any(|frame| frame.id == 0x123) && !told.is_empty());
+    let (expected, _) = log("x.blf", second).frames().unwrap();
+    assert_eq!(frames, expected);
+    assert!(
+        told.iter()
+            .any(|note| note.to_string().contains("the file is cut or damaged"))
+    );
 }
 
 #[test]
@@ -394,6 +417,29 @@ fn lengths_commas_and_encodings_of_others_are_read() {
     assert_eq!(course(&found, "Torque"), [(0.5, 0.5), (1.5, 0.5)]);
     let found = read("two.log", "cp1252.dbc").unwrap();
     assert_eq!(found.find("can0.STEER.Angle").unwrap().1.unit, "\u{b0}");
+}
+
+/// Bus logging in MDF 4 as python-can writes it through asammdf: the same frames as in the other formats.
+#[test]
+fn bus_logging_in_mdf_is_read_with_a_dbc_file() {
+    let Ok(Contents::Frames(log)) =
+        formats::read_bytes(file("channels.mf4"), Format::Mdf4, Reading::default())
+    else {
+        panic!("no frames");
+    };
+    let (frames, told) = log.frames().unwrap();
+    let (expected, _) = self::log("x.blf", file("channels.blf")).frames().unwrap();
+    let plain = |f: &BusFrame| (f.id, f.extended, f.form, f.data.clone());
+    assert!(frames.iter().map(plain).eq(expected.iter().map(plain)));
+    assert!(
+        told.iter()
+            .any(|note| note.to_string().starts_with("1 frame left out: remote frame"))
+    );
+    let found = dbc::channels(&log, &file("one.dbc"), None).unwrap();
+    near(&values(&found, "0.STEER.Angle")[..2], &[10.0, 10.1]);
+    near(&values(&found, "1.STEER.Angle")[..2], &[-10.0, -10.1]);
+    let one = dbc::channels(&log.of_bus(Some("1")), &file("one.dbc"), None).unwrap();
+    assert_eq!(values(&one, "Torque").len(), 10);
 }
 
 /// What is written row by row is what the whole table is, and the list of channels is that of the whole.
@@ -422,6 +468,21 @@ fn a_log_is_the_same_flat_as_whole() {
         let signals = Signals::of(&log, &file(meaning)).unwrap();
         assert_eq!(signals.notes, whole.notes, "{name}");
         assert_eq!(signals.table(), whole.table(), "{name}");
+        let grids = [None, Some(0.005)].map(|longest_s| {
+            let [flat, whole] = [
+                signals.resampled(250.0, longest_s),
+                whole.resampled(250.0, longest_s),
+            ];
+            let text = |group| format!("{group:?}");
+            (
+                flat.map(text).map_err(|e| e.to_string()),
+                whole.map(text).map_err(|e| e.to_string()),
+            )
+        });
+        assert!(
+            grids.iter().all(|(flat, whole)| flat == whole),
+            "{name}: {grids:?}"
+        );
         let mut flat = Vec::new();
         signals.write_csv(&mut flat).unwrap();
         let path = place.path().join("x.csv");

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use haptic_log::bus::{BusFrame, Form};
 use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
+use haptic_log::notes::Notes;
 use haptic_log::recording::{Group, Recording, Series};
 
 fn series(name: &str, unit: &str, values: impl Iterator<Item = f64>) -> Series {
@@ -49,7 +50,7 @@ fn frames() -> Vec<BusFrame> {
             _ => Form::Classic,
         },
         sent: k.is_multiple_of(4),
-        data: (0..if k % 9 == 0 { 64 } else { k as u8 % 9 }).collect(),
+        data: (0..if k.is_multiple_of(9) { 64 } else { k as u8 % 9 }).collect(),
     };
     (0..2000).map(frame).collect()
 }
@@ -67,7 +68,7 @@ fn written(extension: &str) -> Vec<u8> {
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join(format!("x.{extension}"));
     if BUSES.contains(&extension) {
-        formats::write_frames(&path, &BusLog::of_frames(frames())).unwrap();
+        formats::write_frames(&path, &BusLog::of_frames(frames(), Notes::default())).unwrap();
     } else {
         formats::write(&path, recording()).unwrap();
     }

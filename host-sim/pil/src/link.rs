@@ -162,4 +162,30 @@ mod tests {
         assert_eq!(decoder.push(b'\r').unwrap(), None);
         assert_eq!(decoder.unread().lines, 4);
     }
+
+    /// An adapter that stamps its frames although it was told not to.
+    #[test]
+    fn stamped_frames_of_an_adapter_are_heard() {
+        use std::io::{Read, Write};
+        let server = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = server.local_addr().unwrap();
+        let adapter = std::thread::spawn(move || {
+            let (mut client, _) = server.accept().unwrap();
+            let mut told = [0; OPEN.len()];
+            client.read_exact(&mut told).unwrap();
+            client
+                .write_all(b"\r\r\r\rt0C080102030405060708EA5F\rt1000\r0000\r")
+                .unwrap();
+            told
+        });
+        let mut listener = crate::live::Listener::on(&format!("tcp:{address}")).unwrap();
+        let mut heard = Vec::new();
+        // The adapter is gone when its thread ends.
+        while let Ok(frame) = listener.frame() {
+            heard.extend(frame.map(|frame| (frame.id(), frame.data().to_vec())));
+        }
+        assert_eq!(heard, [(0x0C0, (1..=8).collect()), (0x100, Vec::new())]);
+        assert_eq!(listener.unread().lines, 1);
+        assert_eq!(&adapter.join().unwrap(), b"C\rS6\rZ0\rO\r");
+    }
 }

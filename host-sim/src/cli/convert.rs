@@ -62,8 +62,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         ));
     }
     let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
-    let mut recording = match arguments.reading.read(&arguments.input)? {
-        Contents::Channels(recording) => recording,
+    let recording = match arguments.reading.read(&arguments.input)? {
+        Contents::Channels(recording) => on_grid(arguments, recording)?,
         Contents::Frames(log) => {
             let (log, bar) = progress::of_log(log);
             let read = of_bus(arguments, &log, target);
@@ -74,10 +74,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             }
         }
     };
-    if let Some(rate_hz) = arguments.rate {
-        let even = recording.resampled(rate_hz, arguments.reading.max_gap()?);
-        recording.groups = vec![even.map_err(in_file(&arguments.input))?];
-    }
     let Some(output) = &arguments.output else {
         list(recording.table(), &recording.notes, arguments.json)?;
         return Ok(Outcome::Good);
@@ -87,6 +83,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     formats::write(output, recording)?;
     eprintln!("{}: {count} channels", output.display());
     Ok(Outcome::Good)
+}
+
+/// The channels on the grid that is asked for.
+fn on_grid(arguments: &Arguments, mut recording: Recording) -> Result<Recording, BadInput> {
+    if let Some(rate_hz) = arguments.rate {
+        let even = recording.resampled(rate_hz, arguments.reading.max_gap()?);
+        recording.groups = vec![even.map_err(in_file(&arguments.input))?];
+    }
+    Ok(recording)
 }
 
 /// What a log of frames becomes, where that needs its whole table; all else is done here, frame by frame.
@@ -105,11 +110,18 @@ fn of_bus(
         eprintln!("{}: {count} frames", output.display());
         return Ok(None);
     }
-    let is_whole = arguments.rate.is_some() || arguments.reading.changes();
-    if is_whole || target.is_some_and(|format| format != Format::Csv) {
-        return arguments.reading.channels(&arguments.input, log).map(Some);
+    let is_table = target.is_some_and(|format| format != Format::Csv) && arguments.rate.is_none();
+    if is_table || arguments.reading.renames() {
+        let recording = arguments.reading.channels(&arguments.input, log)?;
+        return on_grid(arguments, recording).map(Some);
     }
-    let signals = Signals::of(log, &arguments.reading.dbc()?).map_err(named)?;
+    let signals = Signals::of(log, &arguments.reading.dbc()?).map_err(&named)?;
+    if let Some(rate_hz) = arguments.rate {
+        let even = signals.resampled(rate_hz, arguments.reading.max_gap()?);
+        let mut recording = Recording::of(even.map_err(named)?);
+        recording.notes = signals.notes;
+        return Ok(Some(recording));
+    }
     let table = signals.table();
     let Some(output) = &arguments.output else {
         list(table, &signals.notes, arguments.json)?;

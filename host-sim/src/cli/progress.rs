@@ -34,11 +34,18 @@ pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sy
     done
 }
 
-/// A log whose reading moves a bar.
+/// A log whose reading moves a bar; a second reading begins anew.
 pub(super) fn of_log(log: BusLog) -> (BusLog, ProgressBar) {
-    let bar = styled(log.size(), "{bar:40} {bytes}/{total_bytes} read, {elapsed}");
+    let size = log.size();
+    let bar = styled(size, "{bar:40} {bytes}/{total_bytes} read, {elapsed}");
     let moved = bar.clone();
-    (log.watched(move |read| moved.inc(read)), bar)
+    let watch = move |read| {
+        if moved.position() >= size {
+            moved.set_position(0);
+        }
+        moved.inc(read);
+    };
+    (log.watched(watch), bar)
 }
 
 /// A bar of `length` steps.

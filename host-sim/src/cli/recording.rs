@@ -116,13 +116,13 @@ impl ReadingArguments {
 
     /// Whether a file is to be understood otherwise than it says itself.
     pub(super) fn is_given(&self) -> bool {
-        self.changes() || self.dbc.is_some() || self.bus.is_some()
+        let is_cut = !self.from.is_empty() || !self.to.is_empty();
+        self.renames() || is_cut || self.dbc.is_some() || self.bus.is_some()
     }
 
-    /// Whether channels get another name, or rows are cut.
-    pub(super) fn changes(&self) -> bool {
-        let lists = [self.map.is_empty(), self.from.is_empty(), self.to.is_empty()];
-        self.time.is_some() || self.layout.is_some() || lists.contains(&false)
+    /// Whether channels get another name.
+    pub(super) const fn renames(&self) -> bool {
+        self.time.is_some() || self.layout.is_some() || !self.map.is_empty()
     }
 
     /// What the frames of a recording of the bus mean.
@@ -150,7 +150,9 @@ impl ReadingArguments {
         let contents = formats::read(path, reading, |file: File| -> Box<dyn Read> { through(file) });
         bar.finish_and_clear();
         Ok(match contents? {
-            Contents::Frames(log) => Contents::Frames(log.of_bus(self.bus.as_deref())),
+            Contents::Frames(log) => {
+                Contents::Frames(log.of_bus(self.bus.as_deref()).within(&self.stretches()?))
+            }
             Contents::Channels(recording) => Contents::Channels(self.named(path, recording, &terms)?),
         })
     }

@@ -10,7 +10,7 @@ use super::dbc::Signals;
 use super::{Format, asc, blf, replaced};
 use crate::bus::{BusFrame, Intake, Take, interface};
 use crate::candump;
-use crate::notes::Notes;
+use crate::notes::{Fate, Notes, Part};
 use crate::recording::{RecordingError, refuse};
 
 /// A log of frames.
@@ -19,6 +19,8 @@ pub struct BusLog {
     input: Input,
     format: Format,
     bus: Option<String>,
+    /// Stretches of time that are wanted, s; all if there is none.
+    stretches: Vec<(f64, f64)>,
     watch: Watch,
 }
 
@@ -26,7 +28,7 @@ pub struct BusLog {
 enum Input {
     File(PathBuf),
     Bytes(Arc<[u8]>),
-    Frames(Arc<[BusFrame]>),
+    Frames(Arc<[BusFrame]>, Notes),
 }
 
 /// Who is told of each part that is read, in bytes.
@@ -56,6 +58,7 @@ impl BusLog {
             input,
             format,
             bus: None,
+            stretches: Vec::new(),
             watch: Watch(Arc::new(|_| ())),
         }
     }
@@ -75,16 +78,23 @@ impl BusLog {
         Self::new(Input::Bytes(bytes.into()), format)
     }
 
-    /// A log of frames that are known already.
+    /// A log of frames that are known already, and what else was read with them.
     #[must_use]
-    pub fn of_frames(frames: Vec<BusFrame>) -> Self {
-        Self::new(Input::Frames(frames.into()), Format::Candump)
+    pub fn of_frames(frames: Vec<BusFrame>, notes: Notes) -> Self {
+        Self::new(Input::Frames(frames.into(), notes), Format::Candump)
     }
 
     /// The frames of one bus alone, by its name in the log; of all if there is none.
     #[must_use]
     pub fn of_bus(mut self, bus: Option<&str>) -> Self {
         self.bus = bus.map(String::from);
+        self
+    }
+
+    /// The frames of these stretches of time alone, s; of all time if there is none.
+    #[must_use]
+    pub fn within(mut self, stretches: &[(f64, f64)]) -> Self {
+        self.stretches = stretches.to_vec();
         self
     }
 
@@ -101,7 +111,7 @@ impl BusLog {
         match &self.input {
             Input::File(path) => std::fs::metadata(path).map_or(0, |known| known.len()),
             Input::Bytes(bytes) => bytes.len() as u64,
-            Input::Frames(_) => 0,
+            Input::Frames(..) => 0,
         }
     }
 
@@ -110,17 +120,38 @@ impl BusLog {
     /// # Errors
     /// Another kind of file; a clock that does not go on; no frame; what `take` says.
     pub fn each(&self, take: &mut Take<'_>) -> Result<Notes, RecordingError> {
+        let (mut inside, mut outside) = (0_u64, None);
+        let mut within = |frame: &BusFrame| {
+            let is_in = |(from, to): &(f64, f64)| (*from..=*to).contains(&frame.time_s);
+            if !self.stretches.is_empty() && !self.stretches.iter().any(is_in) {
+                let (count, _) = outside.get_or_insert((0, frame.line));
+                *count += 1;
+                return Ok(());
+            }
+            inside += 1;
+            take(frame)
+        };
+        let take = &mut within as &mut Take<'_>;
         let read = match &self.input {
             Input::File(path) => self.read(File::open(path).map_err(refuse)?, take),
             Input::Bytes(bytes) => self.read(&bytes[..], take),
-            Input::Frames(frames) => {
+            Input::Frames(frames, notes) => {
                 let mut intake = Intake::new("frame", self.bus.as_deref(), take);
+                intake.notes = notes.clone();
                 let mut each = frames.iter();
                 each.try_for_each(|frame| intake.frame(frame))
                     .and_then(|()| intake.finish())
             }
         };
-        read.map_err(RecordingError::printable)
+        let mut notes = read.map_err(RecordingError::printable)?;
+        if let Some((count, first)) = outside {
+            let (why, place) = ("outside of the time asked for", format_args!("line {first}"));
+            notes.count_many(Fate::LeftOut, Part::Frame, why, count, place);
+        }
+        if inside == 0 {
+            return Err("there is no frame in the stretches of --from and --to".into());
+        }
+        Ok(notes)
     }
 
     fn read(&self, input: impl Read, take: &mut Take<'_>) -> Result<Notes, RecordingError> {

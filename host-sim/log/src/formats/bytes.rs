@@ -1,6 +1,10 @@
 //! Little-endian numbers at places that a file names, and that may not be there.
 
 use miniz_oxide::inflate::TINFLStatus;
+use miniz_oxide::inflate::core::inflate_flags::TINFL_FLAG_COMPUTE_ADLER32 as COMPUTE_ADLER32;
+use miniz_oxide::inflate::core::inflate_flags::TINFL_FLAG_PARSE_ZLIB_HEADER as PARSE_ZLIB_HEADER;
+use miniz_oxide::inflate::core::inflate_flags::TINFL_FLAG_USING_NON_WRAPPING_OUTPUT_BUF as USING_NON_WRAPPING_OUTPUT_BUF;
+use miniz_oxide::inflate::core::{DecompressorOxide, decompress};
 
 use crate::recording::RecordingError;
 
@@ -101,14 +105,23 @@ impl Budget {
 
     /// Undoes zlib as far as the bytes are good, and says whether all are.
     pub(super) fn inflated_as_far(&mut self, compressed: &[u8]) -> Result<(Vec<u8>, bool), RecordingError> {
-        let inflated = miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(compressed, self.bytes);
-        let (inflated, is_whole) = match inflated {
-            Ok(whole) => (whole, true),
-            Err(e) if e.status == TINFLStatus::HasMoreOutput => return Err(too_large()),
-            Err(e) => (e.output, false),
+        let flags = PARSE_ZLIB_HEADER | COMPUTE_ADLER32 | USING_NON_WRAPPING_OUTPUT_BUF;
+        let mut state = DecompressorOxide::new();
+        let mut out = vec![0; compressed.len().saturating_mul(4).max(64).min(self.bytes)];
+        let (mut used, mut made) = (0, 0);
+        let is_whole = loop {
+            // The call that returns a vector leaves what it has not made as zeros at its end.
+            let step = decompress(&mut state, &compressed[used..], &mut out, made, flags);
+            (used, made) = (used + step.1, made + step.2);
+            match step.0 {
+                TINFLStatus::HasMoreOutput if out.len() == self.bytes => return Err(too_large()),
+                TINFLStatus::HasMoreOutput => out.resize(out.len().saturating_mul(2).min(self.bytes), 0),
+                status => break status == TINFLStatus::Done,
+            }
         };
-        self.bytes -= inflated.len();
-        Ok((inflated, is_whole))
+        out.truncate(made);
+        self.bytes -= made;
+        Ok((out, is_whole))
     }
 
     #[cfg(feature = "parquet")]

@@ -8,8 +8,8 @@ use std::collections::{HashMap, HashSet};
 
 use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 
-use super::Reading;
 use super::bytes::{Budget, Bytes, half};
+use super::{Reading, mdf_bus};
 use crate::notes::{Fate, Notes, Part};
 use crate::recording::{Group, Recording, RecordingError, Series};
 use crate::units;
@@ -363,6 +363,30 @@ fn place(
     }))
 }
 
+/// Each byte of a field of bytes as a number; none if they do not stand in the record.
+fn bytes_of(block: &Block<'_>) -> Result<Option<Vec<Place>>, RecordingError> {
+    let (b, data) = (block.bytes, block.data());
+    let (channel_type, kind, bits) = (b.u8(data)?, b.u8(data + 2)?, b.u32(data + 8)?);
+    if channel_type != 0 || kind != 10 || bits > 8 * 64 {
+        return Ok(None);
+    }
+    let from = 8 * u64::from(b.u32(data + 4)?);
+    let byte = |i: u64| Place {
+        series: Series {
+            name: format!("{}.{i}", mdf_bus::BYTES),
+            ..Series::default()
+        },
+        time: false,
+        is_virtual: false,
+        kind: 0,
+        bit: from + 8 * i,
+        bits: 8,
+        invalid_bit: None,
+        conversion: Conversion::None,
+    };
+    Ok(Some((0..u64::from(bits / 8)).map(byte).collect()))
+}
+
 impl Place {
     fn value(&self, record: &[u8], row: usize) -> f64 {
         if self.is_virtual {
@@ -486,9 +510,16 @@ impl Found<'_> {
                 }
                 None => {}
             }
+            if name == mdf_bus::BYTES
+                && let Some(bytes) = bytes_of(&channel)?
+            {
+                out.extend(bytes);
+                continue;
+            }
             let made = place(&channel, name.clone(), data_bytes)?;
             let is_time = made.as_ref().is_ok_and(|made| made.time) || self.is_time(&name);
-            if !is_time && self.reading.only.is_some_and(|is_wanted| !is_wanted(&name)) {
+            let is_of_bus = name.starts_with(mdf_bus::FRAME);
+            if !is_time && !is_of_bus && self.reading.only.is_some_and(|is_wanted| !is_wanted(&name)) {
                 self.unread.push(name);
                 continue;
             }

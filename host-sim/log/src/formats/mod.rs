@@ -24,6 +24,7 @@ mod mat;
 #[cfg(feature = "mcap")]
 mod mcap;
 mod mdf;
+mod mdf_bus;
 #[cfg(feature = "parquet")]
 mod parquet;
 
@@ -206,9 +207,11 @@ fn contents(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Cont
             return Ok(Contents::Frames(BusLog::of_bytes(bytes, format)));
         }
         Format::Mdf4 => {
-            return Ok(Contents::Channels(
-                mdf::read(&bytes, reading)?.described().settled()?,
-            ));
+            let recording = mdf::read(&bytes, reading)?;
+            return Ok(match mdf_bus::frames(&recording) {
+                Some((frames, notes)) => Contents::Frames(BusLog::of_frames(frames, notes)),
+                None => Contents::Channels(recording.described().settled()?),
+            });
         }
         Format::Mcap => {
             return Err("MCAP is written, not read: convert from what it was made of".into());

@@ -17,7 +17,6 @@ impl Recording {
         if self.groups.len() <= 1 {
             return Ok(self.groups.into_iter().next().unwrap_or_default());
         }
-        let many = |name: &str| self.channels().filter(|(_, c)| c.name == name).count() > 1;
         // Zero is added so that a negative zero, which some loggers write first, is the same instant as zero.
         let instants = |g: &Group| g.time_s.iter().map(|t| t + 0.0).collect::<Vec<f64>>();
         let mut time_s: Vec<f64> = self.groups.iter().flat_map(instants).collect();
@@ -35,12 +34,8 @@ impl Recording {
                 for (place, value) in places.iter().zip(&channel.values) {
                     values[*place] = *value;
                 }
-                let name = match many(&channel.name) {
-                    true => format!("{}.{}", group.name, channel.name),
-                    false => channel.name.clone(),
-                };
                 channels.push(Series {
-                    name,
+                    name: self.name(group, channel),
                     values,
                     ..channel.clone()
                 });
@@ -67,93 +62,196 @@ impl Recording {
     /// # Errors
     /// No time that all channels cover, instants that do not grow, a clock that was set, more than 30 million values.
     pub fn resampled(&self, rate_hz: f64, longest_s: Option<f64>) -> Result<Group, RecordingError> {
-        let whole = |name: &str| {
-            let mut all = self.channels().filter(|(_, c)| c.name == name);
-            all.all(|(_, c)| c.values.iter().all(|v| v.is_nan() || v.fract() == 0.0))
-        };
-        self.on_grid(rate_hz, longest_s.unwrap_or(f64::INFINITY), whole)
-    }
-
-    /// As [`Recording::resampled`], with a say in which channels are held.
-    ///
-    /// # Errors
-    /// As there.
-    fn on_grid(
-        &self,
-        rate_hz: f64,
-        longest_s: f64,
-        held: impl Fn(&str) -> bool,
-    ) -> Result<Group, RecordingError> {
         self.check_names()?;
         let mut courses = Vec::new();
         for (group, channel) in self.channels() {
+            let name = self.name(group, channel);
             if let Some(k) = group.step_back() {
-                let name = &channel.name;
                 return Err(format!("channel {name}: row {}: the time does not grow", k + 2).into());
             }
-            let (time_s, values) = channel.present_values(group);
-            let longest = (1..time_s.len()).max_by(|a, b| {
-                let gap = |k: usize| time_s[k] - time_s[k - 1];
-                gap(*a).total_cmp(&gap(*b))
-            });
-            if let Some(k) = longest.filter(|&k| (time_s[k] - time_s[k - 1]) * rate_hz > MOST_BRIDGED) {
-                let (name, before, after) = (&channel.name, time_s[k - 1], time_s[k]);
+            let mut seen = Seen::default();
+            present(group, channel).for_each(|(time_s, value)| seen.take(time_s, value));
+            if seen.samples > 0 {
+                courses.push((group, channel, name, seen));
+            }
+        }
+        let grid = Grid::over(
+            courses.iter().map(|(_, _, name, seen)| (&name[..], seen)),
+            rate_hz,
+            longest_s,
+        )?;
+        let channels = courses.iter().map(|(group, channel, name, _)| {
+            let same = courses.iter().filter(|(_, other, ..)| other.name == channel.name);
+            let mut course = OnGrid::new(same.into_iter().all(|(.., seen)| seen.is_whole));
+            present(group, channel).for_each(|(time_s, value)| course.take(&grid, time_s, value));
+            Series {
+                name: name.clone(),
+                unit: channel.unit.clone(),
+                source: channel.source.clone(),
+                values: course.finish(&grid),
+            }
+        });
+        Ok(Group::new(grid.instants(), channels.collect()))
+    }
+}
+
+/// The values of a channel that are there.
+fn present<'a>(group: &'a Group, channel: &'a Series) -> impl Iterator<Item = (f64, f64)> {
+    let all = group.time_s.iter().copied().zip(channel.values.iter().copied());
+    all.filter(|(_, value)| !value.is_nan())
+}
+
+/// What is known of a channel before its values are put on a grid.
+#[derive(Debug, Clone)]
+pub(crate) struct Seen {
+    /// First and last instant of a value.
+    pub(crate) span_s: [f64; 2],
+    pub(crate) samples: usize,
+    /// The longest pause.
+    longest_s: [f64; 2],
+    /// Whether all values are whole numbers.
+    pub(crate) is_whole: bool,
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        Self {
+            span_s: [0.0; 2],
+            samples: 0,
+            longest_s: [0.0; 2],
+            is_whole: true,
+        }
+    }
+}
+
+impl Seen {
+    /// Takes the next value.
+    pub(crate) fn take(&mut self, time_s: f64, value: f64) {
+        let [first, last] = if self.samples == 0 {
+            [time_s; 2]
+        } else {
+            self.span_s
+        };
+        if time_s - last > self.longest_s[1] - self.longest_s[0] {
+            self.longest_s = [last, time_s];
+        }
+        self.span_s = [first, time_s];
+        self.samples += 1;
+        self.is_whole &= value.fract() == 0.0;
+    }
+}
+
+/// Instants up to a microsecond before a value have it already, as clocks round.
+const ROUNDED_S: f64 = 1e-6;
+
+/// Instants at one distance, over the time that all channels cover.
+pub(crate) struct Grid {
+    from_s: f64,
+    rate_hz: f64,
+    rows: usize,
+    longest_s: f64,
+}
+
+impl Grid {
+    /// The grid of these channels.
+    ///
+    /// # Errors
+    /// As of [`Recording::resampled`].
+    pub(crate) fn over<'a>(
+        channels: impl Iterator<Item = (&'a str, &'a Seen)>,
+        rate_hz: f64,
+        longest_s: Option<f64>,
+    ) -> Result<Self, RecordingError> {
+        let (mut from_s, mut to_s, mut count) = (f64::NEG_INFINITY, f64::INFINITY, 0.0);
+        for (name, seen) in channels {
+            let [before, after] = seen.longest_s;
+            if (after - before) * rate_hz > MOST_BRIDGED {
                 return Err(format!(
                     "channel {name}: its time goes from {before} to {after} s: a clock that was set, or a logger that slept; \
                      cut the file there, or leave the instants as they are (no --rate)"
                 )
                 .into());
             }
-            if !time_s.is_empty() {
-                courses.push((channel, time_s, values));
-            }
+            from_s = seen.span_s[0].max(from_s);
+            to_s = seen.span_s[1].min(to_s);
+            count += 1.0;
         }
-        let (starts, ends): (Vec<f64>, Vec<f64>) =
-            courses.iter().map(|(_, t, _)| (t[0], t[t.len() - 1])).unzip();
-        let from = starts.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        let to = ends.into_iter().fold(f64::INFINITY, f64::min);
-        let rows = ((to - from) * rate_hz + 1e-6).floor() + 1.0;
-        if courses.is_empty() || rows < 1.0 {
+        let rows = ((to_s - from_s) * rate_hz + 1e-6).floor() + 1.0;
+        if count == 0.0 || rows < 1.0 {
             return Err("the channels have no time in common".into());
         }
-        if rows * courses.len() as f64 > MOST_VALUES {
-            let (span_s, count) = (to - from, courses.len());
+        if rows * count > MOST_VALUES {
             return Err(format!(
-                "{count} channels over {span_s:.0} s at {rate_hz} Hz are {:.1e} values, and {MOST_VALUES:.0e} are the most: \
+                "{count} channels over {:.0} s at {rate_hz} Hz are {:.1e} values, and {MOST_VALUES:.0e} are the most: \
                  give a lower --rate",
-                rows * count as f64
+                to_s - from_s,
+                rows * count
             )
             .into());
         }
-        let time_s: Vec<f64> = (0..rows as usize).map(|k| from + k as f64 / rate_hz).collect();
-        let channels = courses
-            .into_iter()
-            .map(|(channel, t, v)| Series {
-                values: on_grid((&t, &v), &time_s, longest_s, held(&channel.name)),
-                ..channel.clone()
-            })
-            .collect();
-        Ok(Group::new(time_s, channels))
+        Ok(Self {
+            from_s,
+            rate_hz,
+            rows: rows as usize,
+            longest_s: longest_s.unwrap_or(f64::INFINITY),
+        })
+    }
+
+    fn instant(&self, row: usize) -> f64 {
+        self.from_s + row as f64 / self.rate_hz
+    }
+
+    pub(crate) fn instants(&self) -> Vec<f64> {
+        (0..self.rows).map(|row| self.instant(row)).collect()
     }
 }
 
-/// Values of a course at rising instants: as held, or on the line between neighbours. Instants up to a microsecond before a
-/// value have it already, as clocks round.
-fn on_grid((time_s, values): (&[f64], &[f64]), at_s: &[f64], longest_s: f64, held: bool) -> Vec<f64> {
-    let mut k = 0;
-    at_s.iter()
-        .map(|&t| {
-            while k + 1 < time_s.len() && time_s[k + 1] <= t + 1e-6 {
-                k += 1;
-            }
-            let next = (k + 1).min(time_s.len() - 1);
-            if t > time_s[k] + 1e-6 && time_s[next] - time_s[k] > longest_s {
-                f64::NAN
-            } else if held || time_s[next] <= time_s[k] {
-                values[k]
-            } else {
-                values[k] + (t - time_s[k]) / (time_s[next] - time_s[k]) * (values[next] - values[k])
-            }
-        })
-        .collect()
+/// A channel on a grid, from values that come in the order of their time: as held, or on the line between neighbours.
+pub(crate) struct OnGrid {
+    is_held: bool,
+    /// The latest value. One that comes at its instant takes its place.
+    last: Option<(f64, f64)>,
+    values: Vec<f64>,
+}
+
+impl OnGrid {
+    pub(crate) const fn new(is_held: bool) -> Self {
+        Self {
+            is_held,
+            last: None,
+            values: Vec::new(),
+        }
+    }
+
+    pub(crate) fn take(&mut self, grid: &Grid, time_s: f64, value: f64) {
+        let next = (time_s, value);
+        if let Some(last) = self.last.filter(|last| last.0 < time_s) {
+            self.fill(grid, last, Some(next));
+        }
+        self.last = Some(next);
+    }
+
+    fn fill(&mut self, grid: &Grid, (time_s, value): (f64, f64), next: Option<(f64, f64)>) {
+        while self.values.len() < grid.rows {
+            let now_s = grid.instant(self.values.len());
+            let at_now = match next {
+                Some((next_s, _)) if next_s <= now_s + ROUNDED_S => return,
+                Some((next_s, _)) if now_s > time_s + ROUNDED_S && next_s - time_s > grid.longest_s => {
+                    f64::NAN
+                }
+                Some((next_s, next)) if !self.is_held => {
+                    value + (now_s - time_s) / (next_s - time_s) * (next - value)
+                }
+                _ => value,
+            };
+            self.values.push(at_now);
+        }
+    }
+
+    pub(crate) fn finish(mut self, grid: &Grid) -> Vec<f64> {
+        if let Some(last) = self.last {
+            self.fill(grid, last, None);
+        }
+        self.values
+    }
 }

@@ -4,7 +4,7 @@
 //! Channels that share their instants are a [`Group`]. A CSV file has one group, a bus one for each message. Not here: what
 //! the channels mean.
 
-mod grid;
+pub(crate) mod grid;
 mod stamps;
 mod term;
 
@@ -93,14 +93,6 @@ pub struct Line {
     pub samples: usize,
 }
 
-impl Series {
-    /// The instants at which it has a value, and these values.
-    fn present_values(&self, group: &Group) -> (Vec<f64>, Vec<f64>) {
-        let all = group.time_s.iter().copied().zip(self.values.iter().copied());
-        all.filter(|(_, value)| !value.is_nan()).unzip()
-    }
-}
-
 impl Group {
     /// A group without a name.
     #[must_use]
@@ -132,7 +124,7 @@ impl Group {
     }
 }
 
-fn rate_hz(samples: usize, span_s: f64) -> f64 {
+pub(crate) fn rate_hz(samples: usize, span_s: f64) -> f64 {
     if span_s > 0.0 {
         (samples - 1) as f64 / span_s
     } else {
@@ -154,6 +146,14 @@ impl Recording {
             .flat_map(|g| g.channels.iter().map(move |c| (g, c)))
     }
 
+    /// The name of a channel, with that of its group where another channel has it too.
+    fn name(&self, group: &Group, channel: &Series) -> String {
+        match self.channels().filter(|(_, c)| c.name == channel.name).count() {
+            1 => channel.name.clone(),
+            _ => format!("{}.{}", group.name, channel.name),
+        }
+    }
+
     /// The table of channels.
     #[must_use]
     pub fn table(&self) -> Vec<Line> {
@@ -164,13 +164,8 @@ impl Recording {
             let ends = first.zip(there.next_back());
             let samples = there.count() + usize::from(first.is_some()) + usize::from(ends.is_some());
             let span_s = ends.map_or(0.0, |(first, last)| group.time_s[last] - group.time_s[first]);
-            let many = self.channels().filter(|(_, c)| c.name == channel.name).count() > 1;
             Line {
-                name: if many {
-                    format!("{}.{}", group.name, channel.name)
-                } else {
-                    channel.name.clone()
-                },
+                name: self.name(group, channel),
                 unit: channel.unit.clone(),
                 source: channel.source.clone(),
                 sample_rate_hz: rate_hz(samples, span_s),
