@@ -323,3 +323,61 @@ fn what_is_mistyped_or_empty_is_answered_with_what_is_meant() {
         );
     }
 }
+
+/// e_y and e_theta of a simulator's own offset, heading error and curvature, held against those of the simulated run: the lane is
+/// taken as an arc, and the heading error is that of the movement, which differs by the side slip.
+#[test]
+fn a_driving_simulators_own_signals_make_the_drivers_points() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(
+        directory.path().join("drive.toml"),
+        "seed = 5\n[driver]\nremnant_sd_nm = 0.1\n",
+    )
+    .unwrap();
+    let layout = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../examples/layouts/driving-simulator.toml"
+    );
+    host_sim(directory.path(), &["run", "drive.toml", "--out", "run"]);
+    let output = host_sim(
+        directory.path(),
+        &["convert", "run/run.csv", "points.csv", "--layout", layout],
+    );
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let columns = |file: &str| {
+        let text = std::fs::read_to_string(directory.path().join(file)).unwrap();
+        let mut lines = text.lines();
+        let names: Vec<String> = lines.next().unwrap().split(',').map(str::to_owned).collect();
+        let place = |name: &str| names.iter().position(|own| own == name).unwrap();
+        let wanted = [place("e_y_m"), place("e_theta_rad")];
+        let row = |line: &str| wanted.map(|i| line.split(',').nth(i).unwrap().parse::<f64>().unwrap());
+        lines.map(row).collect::<Vec<_>>()
+    };
+    let (truth, found) = (columns("run/run.csv"), columns("points.csv"));
+    assert_eq!(truth.len(), found.len());
+    let worst = |i: usize| {
+        truth
+            .iter()
+            .zip(&found)
+            .map(|(a, b)| (a[i] - b[i]).abs())
+            .fold(0.0, f64::max)
+    };
+    let largest = |i: usize| truth.iter().map(|a| a[i].abs()).fold(0.0, f64::max);
+    assert!(
+        worst(0) < 0.002 && largest(0) > 0.1,
+        "{} of {} m",
+        worst(0),
+        largest(0)
+    );
+    assert!(
+        worst(1) < 0.01 && largest(1) > 0.05,
+        "{} of {} rad",
+        worst(1),
+        largest(1)
+    );
+}

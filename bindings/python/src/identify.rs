@@ -41,6 +41,7 @@ pub(crate) struct How<'py> {
     maps: Vec<String>,
     layout: Option<String>,
     dbc: Option<PathBuf>,
+    bus: Option<String>,
     vehicle: Option<Bound<'py, Scenario>>,
 }
 
@@ -73,6 +74,7 @@ impl How<'_> {
         let layout = layout.map_err(|error| errors::input(py, error))?;
         let how = Recording {
             dbc: self.dbc.as_deref(),
+            bus: self.bus.as_deref(),
             vehicle: self
                 .vehicle
                 .as_ref()

@@ -220,6 +220,22 @@ def test_a_mapping_that_cannot_be_is_refused(options, says):
         hg.identify(foreign(), **options)
 
 
+def test_what_was_left_out_is_told_and_the_time_has_a_name_and_a_unit(tmp_path):
+    table_ = table(LOGS / "guided-probe-clean.csv")
+    names = list(table_)
+    path = tmp_path / "drive.csv"
+    rows = [[f"{1e3 * row[0]:.6f}", *map(repr, map(float, row[1:])), ""] for row in zip(*table_.values())]
+    rows[0][-1] = "0.5"
+    rows[7][-1] = "left"
+    heading = ["t", *names[1:], "speed_kmh"]
+    path.write_text("\n".join(map(",".join, [heading, *rows])) + "\n")
+    fit = hg.identify(path, time="t [ms]")
+    assert ("1 channel (speed_kmh)", 'line 9: speed_kmh is "left", which is not a number', "left out") in fit.reading
+    assert fit["k_hg"].identified == hg.identify(LOGS / "guided-probe-clean.csv")["k_hg"].identified
+    with pytest.raises(hg.InputError, match="time: map names time_s too"):
+        hg.identify(path, time="t [ms]", map={"time_s": "t"})
+
+
 def test_a_mapping_of_a_file_is_refused_by_name():
     for given, says in [({"e_y": "t"}, "e_y"), ({"e_y_m": "none"}, "none"), ({"e_y_m": "t*0"}, "factor")]:
         with pytest.raises(hg.InputError, match=says):

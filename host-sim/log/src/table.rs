@@ -77,6 +77,8 @@ struct Lf<R> {
     source: R,
     last: u8,
     after_cr: bool,
+    /// Whether the last line did not end.
+    is_open: bool,
 }
 
 impl<R: Read> Read for Lf<R> {
@@ -87,6 +89,7 @@ impl<R: Read> Read for Lf<R> {
                 let is_open = self.last != b'\n' && !out.is_empty();
                 if is_open {
                     (self.last, out[0]) = (b'\n', b'\n');
+                    self.is_open = true;
                 }
                 return Ok(usize::from(is_open));
             }
@@ -116,6 +119,7 @@ pub struct TableReader<R> {
     header_line: u64,
     reader: csv::Reader<BufReader<Lf<R>>>,
     fields: csv::ByteRecord,
+    cut: Option<u64>,
 }
 
 impl<R: Read> TableReader<R> {
@@ -125,11 +129,12 @@ impl<R: Read> TableReader<R> {
     /// What cannot be read.
     pub fn new(source: R) -> Result<Self, TableError> {
         let unreadable = |e: &dyn std::fmt::Display| TableError::Unreadable(e.to_string());
-        let (last, after_cr) = (b'\n', false);
+        let (last, after_cr, is_open) = (b'\n', false, false);
         let mut source = BufReader::new(Lf {
             source,
             last,
             after_cr,
+            is_open,
         });
         let (mut header_line, mut separator) = (1, None);
         let heading = loop {
@@ -141,12 +146,12 @@ impl<R: Read> TableReader<R> {
             if header_line == 1 && (line.starts_with(&[0xFF, 0xFE]) || line.starts_with(&[0xFE, 0xFF])) {
                 return Err(unreadable(&"this is UTF-16: save it as UTF-8"));
             }
-            let text = line
-                .strip_prefix(b"\xEF\xBB\xBF")
-                .unwrap_or(&line)
-                .trim_ascii_end();
-            match text.strip_prefix(b"sep=") {
-                Some(&[said]) => separator = Some(said),
+            let text = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line);
+            let text = text.strip_suffix(b"\n").unwrap_or(text);
+            let quoted = text.strip_prefix(b"\"").and_then(|rest| rest.strip_suffix(b"\""));
+            match quoted.unwrap_or(text) {
+                // As Excel writes it.
+                &[s, e, p, b'=', said] if [s, e, p].eq_ignore_ascii_case(b"sep") => separator = Some(said),
                 _ if text.starts_with(b"#") || text.trim_ascii().is_empty() => {}
                 _ => break text.to_vec(),
             }
@@ -168,7 +173,14 @@ impl<R: Read> TableReader<R> {
             header_line,
             reader: table.from_reader(source),
             fields: csv::ByteRecord::new(),
+            cut: None,
         })
+    }
+
+    /// The line within which the file ends, if it does: its row is none.
+    #[must_use]
+    pub fn cut(&self) -> Option<u64> {
+        self.cut
     }
 
     /// Names of the columns, as they are written.
@@ -204,6 +216,10 @@ impl<R: Read> TableReader<R> {
             match self.fields.len() {
                 found if found == expected && !is_blank => break,
                 _ if is_blank => {}
+                found if found < expected && self.is_last()? => {
+                    self.cut = Some(line);
+                    return Ok(None);
+                }
                 found => {
                     return Err(TableError::Fields {
                         line,
@@ -216,6 +232,17 @@ impl<R: Read> TableReader<R> {
         let line = self.header_line + self.reader.position().line() - 1;
         let fields = &self.fields;
         Ok(Some(Row { line, fields }))
+    }
+}
+
+impl<R: Read> TableReader<R> {
+    /// Whether the row that was read is the last one, and its line does not end.
+    fn is_last(&mut self) -> Result<bool, TableError> {
+        if !self.reader.get_ref().get_ref().is_open {
+            return Ok(false);
+        }
+        let more = self.reader.read_byte_record(&mut csv::ByteRecord::new());
+        Ok(!more.map_err(|e| TableError::Unreadable(e.to_string()))?)
     }
 }
 
@@ -258,7 +285,9 @@ impl<W: Write> TableWriter<W> {
 }
 
 /// What loggers write where there is no value.
-const NOTHING: [&str; 7] = ["", "-", "na", "n/a", "nan", "none", "null"];
+const NOTHING: [&str; 12] = [
+    "", "-", "--", "na", "n/a", "#n/a", "<na>", "nan", "nil", "none", "null", "missing",
+];
 
 /// A field as a number: NaN where it says that there is none, nothing where it is a text.
 #[must_use]
@@ -333,7 +362,30 @@ mod tests {
         let mut table = TableReader::new(&b"a,b\n1,2\n\n3\n"[..]).unwrap();
         assert!(table.next_row().is_ok());
         let error = table.next_row().unwrap_err();
+        assert_eq!(table.cut(), None);
         assert_eq!(error.to_string(), "line 4: 1 fields where the header has 2");
+    }
+
+    #[test]
+    fn a_last_row_that_does_not_end_is_cut() {
+        let mut table = TableReader::new(&b"a,b\n1,2\n3,4\n5"[..]).unwrap();
+        assert_eq!(rows(&mut table).len(), 2);
+        assert_eq!(table.cut(), Some(4));
+        // A whole one may lack the end of its line.
+        let mut table = TableReader::new(&b"a,b\n1,2\n3,4"[..]).unwrap();
+        assert_eq!((rows(&mut table).len(), table.cut()), (2, None));
+    }
+
+    #[test]
+    fn a_line_sep_says_what_separates() {
+        for (text, expected) in [
+            ("sep=\t\na,b\tc\n", "a,b"),
+            ("\"sep=;\"\r\na,b;c\r\n", "a,b"),
+            ("SEP=,\na;b,c\n", "a;b"),
+        ] {
+            let table = TableReader::new(text.as_bytes()).unwrap();
+            assert_eq!(table.header(), [expected, "c"], "{text:?}");
+        }
     }
 
     #[test]

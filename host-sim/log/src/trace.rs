@@ -214,6 +214,10 @@ impl Trace {
             }
             samples.push(sample);
         }
+        if let Some(line) = table.cut() {
+            let what = "the file ends in it".into();
+            return Err(TableError::Row { line, what });
+        }
         let ends = samples.last().zip(samples.first());
         let span_s = ends.map_or(0.0, |(b, a)| b.time_s - a.time_s);
         let sample_rate_hz = match span_s > 0.0 {

@@ -6,14 +6,20 @@ const UNITS: &[(&str, &str, f64)] = &[
     ("torque", "mnm", 1e-3),
     ("torque", "cnm", 1e-2),
     ("torque", "knm", 1e3),
+    ("torque", "lbft", 1.355_817_948_331_400_4),
     ("angle", "rad", 1.0),
     ("angle", "mrad", 1e-3),
     ("angle", "deg", std::f64::consts::PI / 180.0),
+    ("angle", "gon", std::f64::consts::PI / 200.0),
+    ("angle", "turn", std::f64::consts::TAU),
     ("length", "m", 1.0),
     ("length", "cm", 1e-2),
     ("length", "mm", 1e-3),
     ("length", "km", 1e3),
     ("length", "ft", 0.3048),
+    ("length", "in", 0.0254),
+    ("time", "h", 3600.0),
+    ("time", "min", 60.0),
     ("time", "s", 1.0),
     ("time", "ms", 1e-3),
     ("time", "us", 1e-6),
@@ -21,9 +27,13 @@ const UNITS: &[(&str, &str, f64)] = &[
     ("speed", "m/s", 1.0),
     ("speed", "km/h", 1.0 / 3.6),
     ("speed", "mph", 0.44704),
+    ("speed", "kn", 1852.0 / 3600.0),
+    ("speed", "ft/s", 0.3048),
     ("angular rate", "rad/s", 1.0),
     ("angular rate", "deg/s", std::f64::consts::PI / 180.0),
+    ("angular rate", "rpm", std::f64::consts::PI / 30.0),
     ("curvature", "1/m", 1.0),
+    ("curvature", "1/km", 1e-3),
     ("none", "1", 1.0),
 ];
 
@@ -46,6 +56,10 @@ const ENDINGS: &[(&str, &str)] = &[
 ];
 
 fn found(unit: &str) -> Option<(&'static str, f64)> {
+    // Capitals are of no account but here: a mega is no milli.
+    if unit.starts_with("MN") {
+        return None;
+    }
     let plain: String = unit
         .to_lowercase()
         .replace('°', "deg")
@@ -58,6 +72,14 @@ fn found(unit: &str) -> Option<(&'static str, f64)> {
         "kph" | "kmh" => "km/h",
         "newtonmeter" | "newtonmetre" => "nm",
         "radian" | "radians" => "rad",
+        "lbfft" | "ftlbf" | "ftlb" => "lbft",
+        "rev" | "turns" => "turn",
+        "inch" => "in",
+        "mi/h" => "mph",
+        "1/min" | "rev/min" => "rpm",
+        "minute" | "minutes" => "min",
+        "hour" | "hours" => "h",
+        "knot" | "knots" => "kn",
         "sec" | "second" | "seconds" => "s",
         "metre" | "meter" => "m",
         other => other,
@@ -75,6 +97,8 @@ fn found(unit: &str) -> Option<(&'static str, f64)> {
 /// assert_eq!(factor("mm", "m"), Some(1e-3));
 /// assert_eq!(factor("Nm", "N.m"), Some(1.0));
 /// assert_eq!(factor("V", "N.m"), None);
+/// assert_eq!(factor("MN.m", "N.m"), None);
+/// assert_eq!(factor("lbf-ft", "N.m"), Some(1.3558179483314004));
 /// ```
 #[must_use]
 pub fn factor(from: &str, to: &str) -> Option<f64> {

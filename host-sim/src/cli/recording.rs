@@ -17,6 +17,9 @@ use haptic_sim::input::in_range;
 use super::convert::print_reading;
 use super::{BadInput, in_file, progress};
 
+/// New names, each with the channel that gets it.
+type Names = Vec<(String, Term)>;
+
 /// How a recording is read.
 #[derive(Debug, Args)]
 pub(super) struct ReadingArguments {
@@ -176,7 +179,7 @@ impl ReadingArguments {
     }
 
     /// The time, and the other channels that get another name.
-    fn terms(&self) -> Result<(Option<Term>, Vec<(String, Term)>), BadInput> {
+    fn terms(&self) -> Result<(Option<Term>, Names), BadInput> {
         let mut terms = Vec::new();
         for map in &self.map {
             let wanted = || format!("--map {map}: NAME=CHANNEL is wanted");

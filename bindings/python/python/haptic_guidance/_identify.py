@@ -181,6 +181,7 @@ def identify(
     time: Optional[str] = None,
     layout: Union[str, os.PathLike[str], None] = None,
     dbc: Union[str, os.PathLike[str], None] = None,
+    bus: Optional[str] = None,
     vehicle: Optional[Scenario] = None,
 ) -> Fit:
     """Identify the driver of a recorded drive.
@@ -223,6 +224,8 @@ def identify(
         otherwise the others are taken.
     dbc : path, optional
         What the frames of a recording of the bus mean, if it is not the product's own bus.
+    bus : str, optional
+        The bus of a recording of several, by its name there: an interface (``"can0"``) or the number of a channel.
     vehicle : Scenario, optional
         The vehicle of a recording of the bus, if not that of table 9. The bus does not carry the driver's far point; it is
         computed with this vehicle.
@@ -249,7 +252,7 @@ def identify(
         raise InputError("pieces: one drive and no as_published is wanted")
     drives = [drive, *also]
     files = [isinstance(each, (str, os.PathLike)) for each in drives]
-    for name, given in (("dbc", dbc), ("vehicle", vehicle)):
+    for name, given in (("dbc", dbc), ("bus", bus), ("vehicle", vehicle)):
         if given is not None and not all(files):
             raise InputError(f"{name}: only for a recording of the bus; columns need none")
     if layout is not None and not all(files):
@@ -267,6 +270,7 @@ def identify(
         maps=[f"{name}={channel}" for name, channel in maps.items()],
         layout=None if layout is None else os.fspath(layout),
         dbc=None if dbc is None else os.fspath(dbc),
+        bus=bus,
         vehicle=vehicle,
     )
     given = [os.fspath(each) if file else _columns(each) for each, file in zip(drives, files)]

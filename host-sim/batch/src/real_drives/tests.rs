@@ -10,7 +10,7 @@ use super::rows::{Rows, turned};
 fn recorded() -> Rows {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/layouts/openlka.csv");
     let bytes = std::fs::read(path).unwrap();
-    Rows::read(&Layout::named("openlka").unwrap(), &bytes, None).unwrap()
+    Rows::read(&Layout::named("openlka").unwrap(), &bytes, None, &[]).unwrap()
 }
 
 /// Rows of 1/8 s: as many by hand with the first torques as shared with the others, under a guidance of 1 N.m.

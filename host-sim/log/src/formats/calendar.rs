@@ -77,7 +77,9 @@ pub(super) fn seconds(text: &str) -> Option<(f64, Origin)> {
     let mut parts = time.trim_end().split(':');
     let [hour, minute] = [number(parts.next()?)?, number(parts.next()?)?];
     let second: f64 = match parts.next() {
-        Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => text.parse().ok()?,
+        Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => {
+            text.replace(',', ".").parse().ok()?
+        }
         Some(_) => return None,
         None => 0.0,
     };
@@ -128,7 +130,7 @@ mod tests {
             ("2025-11-10T10:00Z", 1_762_768_800.0),
             ("2025/11/10 11:30:00+01:30", 1_762_768_800.0),
             ("10.11.2025 05:00:00-0500", 1_762_768_800.0),
-            ("2000-02-29T23:59:59.5", 951_868_799.5),
+            ("2000-02-29T23:59:59,5", 951_868_799.5),
         ] {
             assert_eq!(seconds(text), Some((expected, Origin::Epoch)), "{text}");
         }

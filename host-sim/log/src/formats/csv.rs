@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 
 use super::calendar::{self, Origin};
 use super::{Only, Table};
-use crate::notes::Fate;
+use crate::notes::{Fate, Part};
 use crate::recording::{Group, RecordingError, Series, refuse};
 use crate::table::{Row, TableError, TableReader, TableWriter, number};
 use crate::units;
@@ -47,6 +47,14 @@ pub(super) fn read(source: impl Read, only: Only<'_>) -> Result<Table, Recording
         for column in &mut columns {
             column.take(row);
         }
+    }
+    if let Some(line) = table.cut() {
+        found.notes.count(
+            Fate::Cut,
+            Part::Row,
+            "the file ends in it",
+            format!("line {line}"),
+        );
     }
     for mut column in columns {
         let name = column.series.name.clone();

@@ -144,7 +144,7 @@ mod tests {
             "e_theta_rad=Heading",
         ]
         .map(map);
-        let (log, _) = of_channels(&recording, &maps, &bus_trace::Recording::default()).unwrap();
+        let (log, _) = of_channels(recording, &maps, &bus_trace::Recording::default()).unwrap();
         assert!((log.dt_s - 0.01).abs() < 1e-12, "{}", log.dt_s);
         let [least, most] = log.speeds_m_per_s.unwrap();
         assert!((least - 10.0).abs() < 1e-9 && (most - 39.975).abs() < 1e-9 && log.changes_speed());

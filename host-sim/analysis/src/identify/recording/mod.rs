@@ -58,6 +58,11 @@ pub fn open(
         let read = log.and_then(|log| once(maps).and_then(|()| of_bus(log, maps, how)));
         return read.map_err(named);
     }
+    if layout.is_none() && matches!(format, None | Some(Format::Csv | Format::Candump)) {
+        // As it comes: a table of many hours fills a memory.
+        let file = std::fs::File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
+        return once(maps).and_then(|()| of_csv(file, maps, how)).map_err(named);
+    }
     let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
     of_bytes(bytes, format, layout, maps, how).map_err(named)
 }
@@ -87,7 +92,7 @@ fn of_bus(
     let dbc = bus_trace::dbc_file(how.dbc)?;
     let only = &|name: &str| is_wanted(maps, name);
     let recording = formats::dbc::channels(&log.of_bus(how.bus), &dbc, Some(only))?;
-    of_channels(&recording, maps, how)
+    of_channels(recording, maps, how)
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.
@@ -137,7 +142,7 @@ fn of_contents(
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     match contents {
         Contents::Frames(log) => of_bus(log, maps, how),
-        Contents::Channels(recording) => of_channels(&recording, maps, how),
+        Contents::Channels(recording) => of_channels(recording, maps, how),
     }
 }
 
@@ -171,7 +176,7 @@ pub fn of_table(
     }
     columns.retain(|(name, _)| is_wanted(maps, name));
     let recording = formats::table(columns, reading(maps, &|_| true).time)?;
-    of_channels(&recording, maps, how)
+    of_channels(recording, maps, how)
 }
 
 fn once(maps: &[Mapping]) -> Result<(), LogError> {
@@ -207,7 +212,7 @@ struct Column<'a> {
 }
 
 fn of_channels(
-    recording: &Recording,
+    mut recording: Recording,
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
@@ -235,23 +240,26 @@ fn of_channels(
         return Err(error.into());
     }
     if !missing.is_empty() {
-        return refuse(are_missing(recording, &missing));
+        return refuse(are_missing(&recording, &missing));
     }
-    let nowhere = Lines::default();
     let one = columns
         .iter()
         .flatten()
         .all(|c| std::ptr::eq(c.group, columns[DRIVER].as_ref().map_or(c.group, |d| d.group)));
-    let (time_s, values) = if one {
-        rows(&columns)
+    let speeds = speeds(&recording, maps, &mut notes)?;
+    let (time_s, values, lines) = if one {
+        let places = columns.map(|column| column.map(|column| column.place(&recording)));
+        rows(&mut recording, &places)
     } else {
-        at_the_torque(&columns, &mut notes)?
+        let (time_s, values) = at_the_torque(&columns, &mut notes)?;
+        (time_s, values, Lines::default())
     };
-    let lines = columns.iter().flatten().next().filter(|_| one);
-    let lines = lines.map_or(&nowhere, |column| &column.group.lines);
-    let mut log = DriveLog::from_rows(time_s, values, manual, (lines, how.stretches))?;
+    let mut log = DriveLog::from_rows(time_s, values, manual, (&lines, how.stretches))?;
     log.findings.extend(recording.notes.iter().map(Note::finding));
-    tell_speed(&mut log, recording, maps, &mut notes)?;
+    if let Some(ends) = speeds {
+        log.tell_speed(&ends);
+        notes.extend(fast(&log));
+    }
     Ok((log, notes))
 }
 
@@ -289,20 +297,17 @@ fn converted(series: &Series, column: usize, map: Option<&Mapping>, scale: f64) 
     format!("{} is {channel} times {scale}", NAMES[column])
 }
 
-/// What the recording says of the speed, if it does. It is not needed: without a mapping another unit or name tells nothing.
-fn tell_speed(
-    log: &mut DriveLog,
+/// The least and the largest speed, m/s, if the recording tells it. It is not needed: without a mapping another unit or name tells nothing.
+fn speeds(
     recording: &Recording,
     maps: &[Mapping],
     notes: &mut Vec<String>,
-) -> Result<(), LogError> {
+) -> Result<Option<[f64; 2]>, LogError> {
     let mapped: Vec<&Mapping> = maps.iter().filter(|map| map.column >= SPEED).collect();
     let (column, map) = match mapped[..] {
         [_, _, ..] => {
-            return refuse(format!(
-                "{} and {} are mapped: one of them is wanted",
-                NAMES[6], NAMES[7]
-            ));
+            let [a, b] = [NAMES[SPEED], NAMES[SPEED + 1]];
+            return refuse(format!("{a} and {b} are mapped: one of them is wanted"));
         }
         [map] => (map.column, Some(map)),
         [] if recording.find(SPEED_COLUMN).is_ok() => (SPEED, None),
@@ -312,17 +317,22 @@ fn tell_speed(
     let found = found.and_then(|(_, series)| Ok((series, factor(series, column, map)?)));
     let (series, scale) = match found {
         Ok(found) => found,
-        Err(_) if map.is_none() => return Ok(()),
+        Err(_) if map.is_none() => return Ok(None),
         Err(error) => return Err(error.into()),
     };
     if scale != 1.0 {
         notes.push(converted(series, column, map, scale));
     }
     let m_per_s = units::factor(UNITS[column], "m/s").unwrap_or(1.0);
-    let speeds: Vec<f64> = series.values.iter().map(|v| v * scale * m_per_s).collect();
-    log.tell_speed(&speeds);
-    notes.extend(fast(log));
-    Ok(())
+    let known = || {
+        series
+            .values
+            .iter()
+            .filter(|v| v.is_finite())
+            .map(|v| v * scale * m_per_s)
+    };
+    let ends = known().reduce(f64::min).zip(known().reduce(f64::max));
+    Ok(ends.map(Into::into))
 }
 
 /// A sentence about a speed that no car is likely to have.
@@ -336,18 +346,42 @@ fn fast(log: &DriveLog) -> Option<String> {
 
 type Values = [Option<Vec<f64>>; 6];
 
-/// The columns as the table has them.
-fn rows(columns: &[Option<Column<'_>>; 6]) -> (Vec<f64>, Values) {
+/// Where a column stands: its group, its channel there, and what makes it SI.
+type Place = (usize, usize, f64);
+
+impl Column<'_> {
+    fn place(&self, recording: &Recording) -> Place {
+        let is_group = |group: &Group| std::ptr::eq(group, self.group);
+        let is_series = |series: &Series| std::ptr::eq(series, self.series);
+        let group = recording.groups.iter().position(is_group);
+        let series = self.group.channels.iter().position(is_series);
+        (group.unwrap_or(0), series.unwrap_or(0), self.scale)
+    }
+}
+
+/// The columns as the table has them, taken out of it: of a drive of many hours two copies are too many.
+fn rows(recording: &mut Recording, places: &[Option<Place>; 6]) -> (Vec<f64>, Values, Lines) {
     let values = std::array::from_fn(|i| {
-        let column = columns[i].as_ref()?;
-        Some(column.series.values.iter().map(|v| v * column.scale).collect())
+        let (group, channel, scale) = places[i]?;
+        let is_same = |other: &Place| (other.0, other.1) == (group, channel);
+        let is_wanted_again = places[i + 1..].iter().flatten().any(is_same);
+        let series = &mut recording.groups[group].channels[channel];
+        let mut values = match is_wanted_again {
+            true => series.values.clone(),
+            false => std::mem::take(&mut series.values),
+        };
+        if scale != 1.0 {
+            values.iter_mut().for_each(|value| *value *= scale);
+        }
+        Some(values)
     });
-    (
-        columns
-            .iter()
-            .flatten()
-            .next()
-            .map_or(Vec::new(), |c| c.group.time_s.clone()),
-        values,
-    )
+    let first = places.iter().flatten().next().map_or(0, |place| place.0);
+    match recording.groups.get_mut(first) {
+        Some(group) => (
+            std::mem::take(&mut group.time_s),
+            values,
+            std::mem::take(&mut group.lines),
+        ),
+        None => (Vec::new(), values, Lines::default()),
+    }
 }

@@ -169,7 +169,7 @@ impl Layout {
             })
         });
         let group = Group::new(time_s, channels.collect());
-        let (mut log, mut notes) = of_channels(&Recording::of(group), &[], how)?;
+        let (mut log, mut notes) = of_channels(Recording::of(group), &[], how)?;
         log.approximate_points = self.columns.contains_key("curvature_1pm");
         log.findings.extend(findings);
         notes.push(format!("Layout {}; {}, {}", self.name, self.source, self.licence));

@@ -187,6 +187,12 @@ impl<'n, 'a> Drive<'n, 'a> {
 
     /// Drives through the sections of a road; returns the links of its last lane onwards, or nothing if the way ends before.
     fn through_sections(&mut self, road: &Road, along: bool) -> Result<Option<Vec<i32>>, RoadError> {
+        let (id, stated_m, length_m) = (road.id, road.stated_m, road.length_m);
+        if (stated_m - length_m).abs() > NOTED_M {
+            self.notes.push(format!(
+                "road {id} says that it is {stated_m} m long, and its geometry is {length_m} m: the geometry is driven"
+            ));
+        }
         let mut sections = road.sections(self.lane)?;
         if !along {
             sections.reverse();

@@ -17,6 +17,9 @@ const LEAST_SECTION_M: f64 = 1e-6;
 pub(super) struct Road<'a> {
     pub(super) id: &'a str,
     pub(super) line: Vec<Geometry>,
+    /// As the road says it.
+    pub(super) stated_m: f64,
+    /// As its geometry has it.
     pub(super) length_m: f64,
     pub(super) lane_offset: Profile,
     pub(super) superelevation: Profile,
@@ -73,6 +76,7 @@ impl<'a> Road<'a> {
         let elevations = elevations.flat_map(|e| children(e, "elevation"));
         let road = Self {
             id,
+            stated_m,
             length_m,
             lane_offset: Profile::read(children(lanes, "laneOffset"), "s", 0.0, &within("lanes"))?,
             superelevation: Profile::read(of_lateral("superelevation"), "s", 0.0, &within("lateralProfile"))?,
