@@ -148,6 +148,33 @@ def buses():
     assert np.allclose(np.diff(even["time_s"]), 0.01)
 
 
+def edges():
+    """Logs of several buses and kinds of frames, and a cut one: what python-can and cantools read in them."""
+    place = Path("tests/data/buses")
+    for name, meaning in (
+        ("two.log", "one"), ("two.asc", "one"), ("channels.blf", "one2"), ("channels.asc", "one2"),
+        ("fdclassic101.blf", "one2"), ("mixed.blf", "one2"), ("cut.blf", "one2"), ("channels.mf4", "one2"),
+    ):
+        meaning = place / f"{meaning}.dbc"
+        database = cantools.database.load_file(meaning)
+        expected = {}
+        for frame in can.LogReader(place / name):
+            if frame.is_error_frame or frame.is_remote_frame or frame.is_extended_id:
+                continue
+            known = [m for m in database.messages if m.frame_id == frame.arbitration_id]
+            for message in known:
+                decoded = message.decode(bytes(frame.data), decode_choices=False, allow_truncated=True)
+                for signal, value in decoded.items():
+                    expected.setdefault((frame.channel, signal), []).append(float(value))
+        ours = table(convert(place / name, "edges.csv", "--dbc", meaning)).drop(columns="time_s")
+        ours = {column.split(" [")[0]: ours[column].dropna().to_numpy() for column in ours}
+        ours = {column: values for column, values in ours.items() if len(values)}
+        assert len(ours) == len(expected) > 0, (name, list(ours), list(expected))
+        for (_, signal), values in expected.items():
+            same = [v for c, v in ours.items() if c.split(".")[-1] == signal and len(v) == len(values)]
+            assert any(np.allclose(v, values, rtol=1e-12) for v in same), (name, signal)
+
+
 def written_by_them(run):
     """What others write, with their types, compressions and units."""
     small = run.iloc[:400]
@@ -234,7 +261,7 @@ def refused():
     """One sentence each: file, channel, reason."""
     bad = WORK / "bad"
     bad.mkdir(exist_ok=True)
-    for name, whole in (("x.parquet", "run.parquet"), ("x.mat", "run.mat"), ("x.mf4", "run.mf4"), ("x.blf", "bus.blf")):
+    for name, whole in (("x.parquet", "run.parquet"), ("x.mat", "run.mat"), ("x.mf4", "run.mf4")):
         (bad / name).write_bytes((WORK / whole).read_bytes()[:3000])
         said = host_sim("convert", bad / name, WORK / "never.csv", code=2)
         assert said.startswith(f"error: {bad / name}: ") and said.count("\n") == 1, said
@@ -253,6 +280,7 @@ def main():
     run = table(CSV)
     written_by_us(run)
     buses()
+    edges()
     written_by_them(run)
     foreign_names()
     refused()
