@@ -7,15 +7,15 @@
 mod fed;
 mod hands;
 mod linear;
+mod reading;
 mod rows;
 #[cfg(test)]
 mod tests;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use haptic_analysis::identify::{
-    DriveLog, Identification, Layout, Mapping, Options, Parameter, Recording, identify_with_noise_model,
-    open_mapped,
+    DriveLog, Identification, Layout, Options, Parameter, Recording, identify_with_noise_model, open_mapped,
 };
 use haptic_log::formats::{self, Format, Reading};
 use rayon::prelude::*;
@@ -27,6 +27,8 @@ pub use fed::{End, Ending, Fed, Feed};
 use hands::Felt;
 pub use hands::Hands;
 use linear::linear;
+pub use reading::Understood;
+use reading::collect;
 use rows::Rows;
 
 /// Circular shifts of the guidance torque that K_hg is held against.
@@ -109,30 +111,6 @@ pub struct Half {
     pub linear: f64,
 }
 
-/// How recordings are understood.
-#[derive(Debug, Clone)]
-pub struct Understood {
-    /// Their layout; the first built-in one that fits if there is none.
-    pub layout: Option<Layout>,
-    /// What is called otherwise than the layout says.
-    pub maps: Vec<Mapping>,
-    /// Stretches that are used, s; all of a drive if there is none.
-    pub stretches: Vec<(f64, f64)>,
-    /// Pauses up to so long are bridged, s.
-    pub bridge_s: f64,
-}
-
-impl Default for Understood {
-    fn default() -> Self {
-        Self {
-            layout: None,
-            maps: Vec::new(),
-            stretches: Vec::new(),
-            bridge_s: Options::default().bridge_s,
-        }
-    }
-}
-
 /// Reads and judges every recording below `directory`.
 ///
 /// # Errors
@@ -180,18 +158,6 @@ struct FileResult<'a> {
     layout: Option<&'a Layout>,
     drives: Vec<RealDrive>,
     hands: Option<(Felt, Vec<Fed>)>,
-}
-
-fn collect(directory: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(directory)? {
-        let path = entry?.path();
-        if path.is_dir() {
-            collect(&path, files)?;
-        } else if Format::from_path(&path).is_ok_and(|format| !format.holds_frames()) {
-            files.push(path);
-        }
-    }
-    Ok(())
 }
 
 fn of_file<'a>(

@@ -9,6 +9,7 @@
 mod instants;
 mod layout;
 mod mapping;
+mod speed;
 
 use std::io::Read;
 use std::path::Path;
@@ -24,6 +25,7 @@ use super::log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN, refuse};
 use instants::at_the_torque;
 pub use layout::{Layout, Table};
 pub use mapping::Mapping;
+use speed::{fast, speeds};
 
 /// What can be mapped: the columns that a log must have, and the speed, in one of two units.
 const NAMES: [&str; 8] = {
@@ -34,8 +36,6 @@ const UNITS: [&str; 8] = ["s", "m", "rad", "rad", "N.m", "N.m", "m/s", "km/h"];
 const GUIDANCE: usize = 4;
 const DRIVER: usize = 5;
 const SPEED: usize = 6;
-/// Faster than cars are driven, m/s: the unit may be another.
-const FAST_M_PER_S: f64 = 50.0;
 
 /// Reads the log at `path`: a CSV file, a recording of the bus, or a file of another tool by its extension; `layout` says what
 /// the columns of a table are, if they are not those of a log. The sentences say what was converted or computed.
@@ -295,53 +295,6 @@ fn converted(series: &Series, column: usize, map: Option<&Mapping>, scale: f64) 
     let own = || format!("{} ({:?})", series.name, series.unit);
     let channel = said.map_or_else(own, str::to_owned);
     format!("{} is {channel} times {scale}", NAMES[column])
-}
-
-/// The least and the largest speed, m/s, if the recording tells it. It is not needed: without a mapping another unit or name tells nothing.
-fn speeds(
-    recording: &Recording,
-    maps: &[Mapping],
-    notes: &mut Vec<String>,
-) -> Result<Option<[f64; 2]>, LogError> {
-    let mapped: Vec<&Mapping> = maps.iter().filter(|map| map.column >= SPEED).collect();
-    let (column, map) = match mapped[..] {
-        [_, _, ..] => {
-            let [a, b] = [NAMES[SPEED], NAMES[SPEED + 1]];
-            return refuse(format!("{a} and {b} are mapped: one of them is wanted"));
-        }
-        [map] => (map.column, Some(map)),
-        [] if recording.find(SPEED_COLUMN).is_ok() => (SPEED, None),
-        [] => (SPEED + 1, None),
-    };
-    let found = recording.find(map.map_or(NAMES[column], |map| &map.term.channel));
-    let found = found.and_then(|(_, series)| Ok((series, factor(series, column, map)?)));
-    let (series, scale) = match found {
-        Ok(found) => found,
-        Err(_) if map.is_none() => return Ok(None),
-        Err(error) => return Err(error.into()),
-    };
-    if scale != 1.0 {
-        notes.push(converted(series, column, map, scale));
-    }
-    let m_per_s = units::factor(UNITS[column], "m/s").unwrap_or(1.0);
-    let known = || {
-        series
-            .values
-            .iter()
-            .filter(|v| v.is_finite())
-            .map(|v| v * scale * m_per_s)
-    };
-    let ends = known().reduce(f64::min).zip(known().reduce(f64::max));
-    Ok(ends.map(Into::into))
-}
-
-/// A sentence about a speed that no car is likely to have.
-fn fast(log: &DriveLog) -> Option<String> {
-    let [_, most] = log.speeds_m_per_s.filter(|[_, most]| *most > FAST_M_PER_S)?;
-    let kmh = 3.6 * most;
-    Some(format!(
-        "The speed goes up to {most:.1} m/s, which is {kmh:.0} km/h: is it in km/h?"
-    ))
 }
 
 type Values = [Option<Vec<f64>>; 6];
