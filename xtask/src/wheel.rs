@@ -49,7 +49,7 @@ const NOT_IN_A_WHEEL: [&str; 10] = [
 ];
 const LARGEST_MB: f64 = 20.0;
 /// What maturin packs into a wheel beside the module: its folder `scripts` is installed among the programs.
-const DATA: &str = "bindings/python/haptic_guidance.data";
+const DATA: &str = "bindings/python/haptic_guidance._native.data";
 
 /// Builds the wheel, and tries it if asked to.
 pub(crate) fn build(options: &Options) -> Result<()> {
