@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 
 use crate::dist;
-use crate::tool::{cargo, root};
+use crate::tool::{self, cargo, output, root};
 
 /// The reference board's core, with floating-point hardware.
 pub(crate) const M4F: &str = "thumbv7em-none-eabihf";
@@ -67,7 +67,8 @@ pub(crate) fn with_map(bin: &str, features: &str) -> Result<(PathBuf, String)> {
     let elf = elf_of(&mut command)?;
     let text = std::fs::read_to_string(root().join(map)).context("the linker's map")?;
     let here = format!("{}/", root().display());
-    Ok((elf, text.replace(&here, "")))
+    let sysroot = output(tool::command("rustc").args(["--print", "sysroot"]))?;
+    Ok((elf, text.replace(&here, "").replace(sysroot.trim(), "rust")))
 }
 
 /// Options of Cargo that leave this machine's folders out of what is built for a board, beside the options of
