@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 
 use crate::dist;
-use crate::tool::{cargo, root};
+use crate::tool::{self, cargo, output, root};
 
 /// The reference board's core, with floating-point hardware.
 pub(crate) const M4F: &str = "thumbv7em-none-eabihf";
@@ -58,16 +58,18 @@ fn command_of(subcommand: &str, bin: &str, target: &str, features: &str) -> Comm
 
 /// Builds an image to the same bytes in whatever folder; its ELF, and the linker's map.
 pub(crate) fn with_map(bin: &str, features: &str) -> Result<(PathBuf, String)> {
-    // Not absolute: Cargo makes names of symbols from it.
-    let map = "target/firmware.map";
+    // Not absolute, because it is among the options that Cargo makes names of symbols from. One for each image: what is built
+    // already is not linked again.
+    let map = format!("target/{bin}-{}.map", features.replace(',', "-"));
     let mut command = command_of("rustc", bin, M4F, features);
     command
         .args(remapped()?)
         .args(["--", "-C", &format!("link-arg=-Map={map}")]);
     let elf = elf_of(&mut command)?;
-    let text = std::fs::read_to_string(root().join(map)).context("the linker's map")?;
+    let text = std::fs::read_to_string(root().join(&map)).context("the linker's map")?;
     let here = format!("{}/", root().display());
-    Ok((elf, text.replace(&here, "")))
+    let sysroot = output(tool::command("rustc").args(["--print", "sysroot"]))?;
+    Ok((elf, text.replace(&here, "").replace(sysroot.trim(), "rust")))
 }
 
 /// Options of Cargo that leave this machine's folders out of what is built for a board, beside the options of

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
+use crate::release::papers;
 use crate::tool::{ALL_FORMATS, Built, HOST_SIM, cargo, command, output, root, run};
 use crate::{dist, venv};
 
@@ -49,7 +50,10 @@ const NOT_IN_A_WHEEL: [&str; 10] = [
 ];
 const LARGEST_MB: f64 = 20.0;
 /// What maturin packs into a wheel beside the module: its folder `scripts` is installed among the programs.
-const DATA: &str = "bindings/python/haptic_guidance.data";
+const DATA: &str = "bindings/python/haptic_guidance._native.data";
+
+/// What a wheel is made of: the module, and the program beside it.
+pub(crate) const PACKAGES: [&str; 2] = ["haptic-python", "host-sim"];
 
 /// Builds the wheel, and tries it if asked to.
 pub(crate) fn build(options: &Options) -> Result<()> {
@@ -110,6 +114,11 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
         let built = dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM);
         std::fs::copy(built, &program)?;
         let host = dist::host()?;
+        let documents = root().join(DATA).join("data/share/doc/haptic-guidance");
+        std::fs::create_dir_all(&documents)?;
+        for paper in papers::of(&PACKAGES, ALL_FORMATS, &host)? {
+            std::fs::write(documents.join(paper.name), paper.bytes)?;
+        }
         maturin.args(["--profile", "dist", "--target", &host]);
         if dist::has_glibc(&host) {
             maturin.args(["--compatibility", "manylinux2014"]);

@@ -9,9 +9,9 @@ use flate2::{Compression, GzBuilder, read::GzDecoder};
 use crate::dist;
 
 /// A file of an archive.
-pub(super) struct Entry {
-    pub(super) name: String,
-    pub(super) bytes: Vec<u8>,
+pub(crate) struct Entry {
+    pub(crate) name: String,
+    pub(crate) bytes: Vec<u8>,
     pub(super) is_program: bool,
 }
 

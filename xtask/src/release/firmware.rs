@@ -29,7 +29,12 @@ pub(super) fn images(release: &Release) -> Result<()> {
             entries.push(Entry::new(&format!("{stem}.map"), map));
             for (ending, format) in [("hex", "ihex"), ("s19", "srec")] {
                 let file = elf.with_extension(ending);
-                run(llvm("llvm-objcopy")?.args(["-O", format]).arg(&elf).arg(&file))?;
+                // By names without a folder: an S-record's header holds the file's.
+                let names = [&elf, &file].map(|file| file.file_name().unwrap_or_default());
+                run(llvm("llvm-objcopy")?
+                    .current_dir(&place)
+                    .args(["-O", format])
+                    .args(names))?;
                 ensure!(
                     flat(&elf, "elf32-littlearm")? == flat(&file, format)?,
                     "{} holds other bytes than its ELF",

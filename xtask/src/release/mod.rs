@@ -3,7 +3,7 @@
 mod archive;
 mod c;
 mod firmware;
-mod papers;
+pub(crate) mod papers;
 mod program;
 mod twice;
 
@@ -16,7 +16,7 @@ use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
 
 use crate::tool::{ALL_FORMATS, Built, cargo, output, root, run};
-use crate::{dist, fmu, web};
+use crate::{dist, fmu, web, wheel};
 use archive::Entry;
 
 /// What `cargo xtask release` is asked for.
@@ -53,23 +53,23 @@ pub(crate) enum Part {
 }
 
 impl Part {
-    /// The package whose dependencies the part carries, its features, and the target they are built for.
-    fn carries(self, host: &str) -> (&'static str, &'static str, String) {
-        let (package, features) = match self {
-            Self::Program => ("host-sim", ALL_FORMATS),
-            Self::Wheel => ("haptic-python", ""),
-            Self::Fmu => ("haptic-fmu", ""),
-            Self::C => ("haptic-c", ""),
-            Self::Page => ("haptic-web", ""),
-            Self::Firmware => ("haptic-firmware", "nucleo-g474re-sensors"),
-            Self::Crate => ("haptic-core", ""),
+    /// The packages whose dependencies the part carries, their features, and the target they are built for.
+    fn carries(self, host: &str) -> (&'static [&'static str], &'static str, String) {
+        let (packages, features): (&[&str], _) = match self {
+            Self::Program => (&["host-sim"], ALL_FORMATS),
+            Self::Wheel => (&wheel::PACKAGES, ALL_FORMATS),
+            Self::Fmu => (&["haptic-fmu"], ""),
+            Self::C => (&["haptic-c"], ""),
+            Self::Page => (&["haptic-web"], ""),
+            Self::Firmware => (&["haptic-firmware"], "nucleo-g474re-sensors"),
+            Self::Crate => (&["haptic-core"], ""),
         };
         let target = match self {
             Self::Page => web::TARGET,
             Self::Firmware => crate::image::M4F,
             _ => host,
         };
-        (package, features, target.to_owned())
+        (packages, features, target.to_owned())
     }
 
     fn name(self) -> String {
@@ -97,8 +97,8 @@ impl Release {
     }
 
     fn papers(&self, part: Part) -> Result<Vec<Entry>> {
-        let (package, features, target) = part.carries(&self.host);
-        papers::of(package, features, &target)
+        let (packages, features, target) = part.carries(&self.host);
+        papers::of(packages, features, &target)
     }
 
     /// An empty folder to try a part in.

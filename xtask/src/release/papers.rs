@@ -24,9 +24,10 @@ const ASSETS: [(&str, &str, &str, &str); 2] = [
     ),
 ];
 
-/// Licences, notices and bill of materials of a package built for a target.
-pub(super) fn of(package: &str, features: &str, target: &str) -> Result<Vec<Entry>> {
-    let linked = linked(package, features, target)?;
+/// Licences, notices and bill of materials of packages built for a target; the first gives the bill its name.
+pub(crate) fn of(packages: &[&str], features: &str, target: &str) -> Result<Vec<Entry>> {
+    let package = *packages.first().context("no package")?;
+    let linked = linked(packages, features, target)?;
     let metadata = output(
         cargo()
             .args("metadata --format-version 1 --locked --filter-platform".split(' '))
@@ -56,11 +57,12 @@ pub(super) fn of(package: &str, features: &str, target: &str) -> Result<Vec<Entr
 }
 
 /// The crates that are linked, not those that only help to compile.
-fn linked(package: &str, features: &str, target: &str) -> Result<BTreeSet<Crate>> {
+fn linked(packages: &[&str], features: &str, target: &str) -> Result<BTreeSet<Crate>> {
     let said = output(
         cargo()
             .args("tree --locked -e normal,no-proc-macro --prefix none -f {p}".split(' '))
-            .args(["-p", package, "--features", features, "--target", target]),
+            .args(packages.iter().flat_map(|package| ["-p", package]))
+            .args(["--features", features, "--target", target]),
     )?;
     let crates = said.lines().filter_map(|line| {
         let mut words = line.split(' ');

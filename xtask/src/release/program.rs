@@ -66,7 +66,7 @@ fn old_enough(program: &Path, release: &Release) -> Result<()> {
     if release.built != Built::ToShip || !dist::has_glibc(&release.host) {
         return Ok(());
     }
-    let said = output(llvm("llvm-readelf")?.arg("--version-info").arg(program))?;
+    let said = output(llvm("llvm-readobj")?.arg("--version-info").arg(program))?;
     let newest = newest_glibc(&said).context("the program asks for no glibc")?;
     println!("needs glibc {}.{}", newest.0, newest.1);
     ensure!(
@@ -78,7 +78,7 @@ fn old_enough(program: &Path, release: &Release) -> Result<()> {
     Ok(())
 }
 
-/// Of versions such as GLIBC_2.17 in what readelf says.
+/// Of versions such as GLIBC_2.17 in what readobj says.
 fn newest_glibc(said: &str) -> Option<(u32, u32)> {
     let versions = said.split("GLIBC_").skip(1).filter_map(|rest| {
         let end = rest.find(|c: char| c != '.' && !c.is_ascii_digit())?;
