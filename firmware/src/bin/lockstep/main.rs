@@ -270,9 +270,15 @@ mod target {
     #[inline(never)]
     fn begin(ecu: &mut Option<Ecu>, start: Start, params: &Params) {
         match Setup::new(params) {
-            Ok(setup) => *ecu = Some(start.ecu_with(&setup)),
+            Ok(setup) => put_together(ecu, start, &setup),
             Err(error) => panic!("{error}"),
         }
+    }
+
+    /// Apart from [`begin`]: a frame that held setup and ECU at once would be larger than the guard below the stack.
+    #[inline(never)]
+    fn put_together(ecu: &mut Option<Ecu>, start: Start, setup: &Setup) {
+        *ecu = Some(start.ecu_with(setup));
     }
 
     fn send(can: &mut impl Can<Frame = Frame>, frame: &Frame) {
