@@ -44,7 +44,7 @@ pub use options::{FixError, Options};
 pub use paper::{TABLE_4, identify as identify_as_published};
 pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
-pub use recording::{Layout, Mapping, Table, of_bytes, of_table, open as open_mapped};
+pub use recording::{Layout, Mapping, Signals, Table, of_bytes, of_table, open as open_mapped};
 pub use result::Refutation;
 pub use result::{
     AtTNms, Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant,

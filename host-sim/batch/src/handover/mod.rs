@@ -12,15 +12,16 @@
 //!
 //! - [`Bend`]: the roads and their speeds.
 //! - [`study`]: the drives, and the worst and the median of what they cost.
+//! - [`HandoverResults`]: what the study found, and what a row has to keep.
 
 mod bend;
+mod results;
 #[cfg(test)]
 mod tests;
 
-use serde::Serialize;
-
 pub use bend::{Bend, Side};
 pub(crate) use bend::{peak_m, stretched_curve};
+pub use results::{Figure, HandoverResults, HandoverRow, MOST_BESIDE_DROP, Place};
 
 use super::Away;
 use super::evaluate::DRIVERS_T_P;
@@ -36,12 +37,6 @@ pub const EVERY_S: f64 = 0.25;
 pub const RELIANCES: [Condition; 2] = [Condition::High, Condition::Mid];
 /// When drivers take over after a failure, s; the paper's after 1 s.
 pub const TAKES_OVER_S: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
-/// From this time on a row has to keep [`MOST_BESIDE_DROP`]: whoever takes over sooner does so against a torque that is meant for
-/// somebody who does not yet.
-const JUDGED_FROM_S: f64 = 1.0;
-/// Most that a handover may cost, times a drop at the same instant. 1.05 was aimed at, and no shape of it reaches that
-/// (docs/decisions/001): this holds what was reached.
-pub const MOST_BESIDE_DROP: f64 = 1.2;
 /// What is left of the lane beside a vehicle of 1.7 m in its middle, m.
 const IN_LANE_M: f64 = 0.95;
 /// So long behind a failure the peak is looked for, s.
@@ -50,81 +45,6 @@ const AFTER_S: f64 = 8.0;
 const BEHIND_S: [f64; 2] = [24.0, 10.0];
 /// An error below this has died down whatever it was before, m.
 const SETTLED_M: f64 = 0.005;
-
-/// Where something was worst.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
-    /// Speed, km/h.
-    pub speed_kmh: f64,
-    /// Radius of the arc, m.
-    pub radius_m: f64,
-    /// Which way the bend turns.
-    pub side: Side,
-    /// The driver's processing delay, s.
-    pub t_p: f64,
-    /// The instant of the failure, s after the bend begins.
-    pub instant_s: f64,
-    /// The same in words.
-    pub place: String,
-}
-
-/// A figure over many instants.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figure {
-    /// Its largest value.
-    pub worst: f64,
-    /// The peak of that drive, m: a ratio is large in a gentle bend too, where the peaks that it compares are small.
-    pub worst_peak_m: f64,
-    /// Its median.
-    pub median: f64,
-    /// Where it was largest.
-    pub at: Place,
-}
-
-/// Drivers of one reliance who take over after one time.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HandoverRow {
-    /// The bend; none for all bends but the paper's.
-    pub bend: Option<Bend>,
-    /// Reliance on the guidance.
-    pub condition: Condition,
-    /// Time from the failure until the driver drives as by hand, s.
-    pub takes_over_after_s: f64,
-    /// Instants of the judged drivers, on both sides.
-    pub instants: usize,
-    /// Ratio with the input lost and handed over; none without a judged driver.
-    pub handover: Option<Figure>,
-    /// Ratio with the torque lost.
-    pub drop: Option<Figure>,
-    /// The handover beside the drop.
-    pub beside_drop: Option<Figure>,
-    /// Judged drives in which the ECU ended guidance by itself: no figure speaks of them.
-    pub left_by_itself: usize,
-}
-
-impl HandoverRow {
-    /// Whether the row has to keep the bound.
-    pub fn is_judged(&self) -> bool {
-        self.takes_over_after_s >= JUDGED_FROM_S
-    }
-
-    /// Whether a handover costs more than a drop where it is judged, or the row rests on a drive that was not guided throughout.
-    pub fn is_broken(&self) -> bool {
-        let is_worse = |figure: &Figure| figure.worst > MOST_BESIDE_DROP;
-        self.left_by_itself > 0 || (self.is_judged() && self.beside_drop.as_ref().is_some_and(is_worse))
-    }
-}
-
-/// What the study found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HandoverResults {
-    /// Spacing of the instants, s.
-    pub every_s: f64,
-    /// All bends but the paper's, by reliance and taking-over time; then each bend.
-    pub rows: Vec<HandoverRow>,
-    /// Most that a handover may cost beside a drop.
-    pub most_beside_drop: f64,
-}
 
 /// What came of one instant, for the two ways to fail.
 #[derive(Debug, Clone)]

@@ -35,7 +35,8 @@ impl Rows {
         format: Option<Format>,
         maps: &[Mapping],
     ) -> Option<Self> {
-        let (time_s, mut table) = layout.signals(bytes, format, maps).ok()?;
+        let signals = layout.signals(bytes, format, maps).ok()?;
+        let (time_s, mut table) = (signals.time_s, signals.columns);
         let yaw = table.remove("yaw_angle_rad");
         let mut column = |name: &str| table.remove(name);
         let shared: Vec<bool> = column("shared")?.iter().map(|s| *s > 0.5).collect();

@@ -166,6 +166,7 @@ impl Study {
     /// # Errors
     /// A session that the study does not have, is simulated or is recorded already; a file that is no drive of it.
     pub fn import(&self, out: &Path, what: &str, file: &Path) -> Result<(), StudyError> {
+        self.session_of_a_person(what)?;
         let csv = std::fs::read(file).map_err(|e| InputError::new(file.display(), e));
         self.import_table(out, what, (file, &csv?))
     }
@@ -180,6 +181,16 @@ impl Study {
         what: &str,
         (file, csv): (&Path, &[u8]),
     ) -> Result<(), StudyError> {
+        let session = self.session_of_a_person(what)?;
+        let place = store::place(out, session);
+        if place.exists() {
+            return Err(store::already(&place));
+        }
+        store::import(self, session, out, (file, csv))
+    }
+
+    /// The session of this name, which a person drives.
+    fn session_of_a_person(&self, what: &str) -> Result<&Session, StudyError> {
         let found = self.sessions.iter().find(|s| s.name() == what);
         let Some(session) = found else {
             let names: Vec<String> = self
@@ -196,11 +207,7 @@ impl Study {
         if session.who != Subject::Person {
             return refuse(format!("{what}: this participant is simulated"));
         }
-        let place = store::place(out, session);
-        if place.exists() {
-            return Err(store::already(&place));
-        }
-        store::import(self, session, out, (file, csv))
+        Ok(session)
     }
 
     /// Drives the simulated sessions that are missing; `done` is called after each, from any thread. What is recorded in `out` is

@@ -23,7 +23,7 @@ use haptic_log::units;
 use super::bus_trace;
 use super::log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN, refuse};
 use instants::at_the_torque;
-pub use layout::{Layout, Table};
+pub use layout::{Layout, Signals, Table};
 pub use mapping::Mapping;
 use speed::{fast, speeds};
 

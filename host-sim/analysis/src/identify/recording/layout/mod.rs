@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use haptic_log::formats::{self, Contents, Format, Reading};
+use haptic_log::notes::Note;
 use haptic_log::recording::{Group, Recording, Series, Term};
 use haptic_log::units;
 use serde::Deserialize;
@@ -21,7 +22,7 @@ use super::{DriveLog, LogError, Mapping, NAMES, SPEED_COLUMN, UNITS, of_channels
 use checks::counted;
 use points::{SLOPE_S, slopes, two_points};
 
-pub use points::Table;
+pub use points::{Signals, Table};
 
 const BUILT_IN: [(&str, &str); 5] = [
     ("openlka", include_str!("../../../../layouts/openlka.toml")),
@@ -134,7 +135,11 @@ impl Layout {
         maps: &[Mapping],
         how: &bus_trace::Recording<'_>,
     ) -> Result<(DriveLog, Vec<String>), LogError> {
-        let (time_s, mut table) = self.signals(bytes, format, maps)?;
+        let Signals {
+            time_s,
+            columns: mut table,
+            notes: left_out,
+        } = self.signals(bytes, format, maps)?;
         let (dt_s, seconds) = step_of(&time_s);
         if let Some(speed) = table.get(SPEED_COLUMN) {
             let rate = slopes(speed, dt_s);
@@ -171,6 +176,7 @@ impl Layout {
         let group = Group::new(time_s, channels.collect());
         let (mut log, mut notes) = of_channels(Recording::of(group), &[], how)?;
         log.approximate_points = self.columns.contains_key("curvature_1pm");
+        log.findings.extend(left_out.iter().map(Note::finding));
         log.findings.extend(findings);
         notes.push(format!("Layout {}; {}, {}", self.name, self.source, self.licence));
         notes.extend(self.note.clone());
@@ -194,10 +200,11 @@ impl Layout {
         bytes: &[u8],
         format: Option<Format>,
         maps: &[Mapping],
-    ) -> Result<(Vec<f64>, Table), LogError> {
-        let (time_s, table) = self.table(bytes, format, maps)?;
-        let (_, seconds) = step_of(&time_s);
-        self.within_limits(&table)?;
+    ) -> Result<Signals, LogError> {
+        let signals = self.table(bytes, format, maps)?;
+        let time_s = &signals.time_s;
+        let (_, seconds) = step_of(time_s);
+        self.within_limits(&signals.columns)?;
         if let Some(missing) = &self.missing {
             let rows = time_s.len();
             return refuse(format!(
@@ -212,7 +219,7 @@ impl Layout {
                 k + 2
             ));
         }
-        Ok((time_s, table))
+        Ok(signals)
     }
 
     /// Its columns, with what can be computed of them, as a recording.
@@ -225,7 +232,11 @@ impl Layout {
         format: Option<Format>,
         maps: &[Mapping],
     ) -> Result<Recording, LogError> {
-        let (time_s, mut table) = self.signals(bytes, format, maps)?;
+        let Signals {
+            time_s,
+            columns: mut table,
+            notes,
+        } = self.signals(bytes, format, maps)?;
         two_points(&mut table, step_of(&time_s).0);
         let channels = table.into_iter().map(|(name, values)| Series {
             unit: units::of_name(&name).unwrap_or_default().into(),
@@ -233,16 +244,14 @@ impl Layout {
             name,
             values,
         });
-        Ok(Recording::of(Group::new(time_s, channels.collect())))
+        Ok(Recording {
+            notes,
+            ..Recording::of(Group::new(time_s, channels.collect()))
+        })
     }
 
     /// The time and the columns, those mapped by the caller in place of the layout's.
-    fn table(
-        &self,
-        bytes: &[u8],
-        format: Option<Format>,
-        maps: &[Mapping],
-    ) -> Result<(Vec<f64>, Table), LogError> {
+    fn table(&self, bytes: &[u8], format: Option<Format>, maps: &[Mapping]) -> Result<Signals, LogError> {
         let mut columns: BTreeMap<&str, Vec<Term>> = BTreeMap::new();
         for (name, text) in &self.columns {
             let terms = text.split(" + ").map(str::parse).collect::<Result<_, _>>();
@@ -305,7 +314,11 @@ impl Layout {
             table.insert(SPEED_COLUMN.into(), kmh.iter().map(|v| v / 3.6).collect());
         }
         let group = recording.groups.into_iter().next().unwrap_or_default();
-        Ok((group.time_s, table))
+        Ok(Signals {
+            time_s: group.time_s,
+            columns: table,
+            notes: recording.notes,
+        })
     }
 }
 

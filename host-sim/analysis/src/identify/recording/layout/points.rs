@@ -2,10 +2,23 @@
 
 use std::collections::BTreeMap;
 
+use haptic_log::notes::Notes;
+
 use super::SPEED_COLUMN;
 
 /// Columns by their names.
 pub type Table = BTreeMap<String, Vec<f64>>;
+
+/// What a layout takes from a table, every row.
+#[derive(Debug)]
+pub struct Signals {
+    /// Time, s.
+    pub time_s: Vec<f64>,
+    /// The layout's signals by name, with their units in it.
+    pub columns: Table,
+    /// What the file holds that these do not.
+    pub notes: Notes,
+}
 
 /// The driver's near and far point ahead, s (table 4).
 const POINTS_S: [f64; 2] = [0.3, 1.0];
