@@ -23,8 +23,6 @@ pub const MOST_TURN: Radians = Radians::from_rad(0.14);
 pub const SLOW: Speed = Speed::from_m_per_s(40.0 / 3.6);
 /// How far it may turn in Standby and beside the probe: 0.5 deg, five steps of an ordinary sensor.
 pub const MOST_TURN_WHEN_TESTED: Radians = Radians::from_rad(0.0087);
-/// Marks a torque that was found frozen, until it changes.
-const FOUND: Micros = Micros::from_us(u32::MAX);
 
 /// How long the driver torque has been the same to the bit, and between which angles the wheel was meanwhile. This
 /// state is not kept twice: a flipped bit can end guidance by a handover, or delay a finding by two seconds.
@@ -35,6 +33,8 @@ pub struct FrozenTorqueState {
     most: Radians,
     lasted: Micros,
     is_tested: bool,
+    /// It was found frozen, and has not changed since.
+    is_found: bool,
 }
 
 impl FrozenTorqueState {
@@ -50,11 +50,11 @@ impl FrozenTorqueState {
         is_tested: bool,
     ) -> bool {
         if torque != self.torque {
-            (self.torque, self.is_tested) = (torque, is_tested);
+            (self.torque, self.is_tested, self.is_found) = (torque, is_tested, false);
             self.restart(wheel);
             return true;
         }
-        if self.lasted == FOUND {
+        if self.is_found {
             return false;
         }
         // A turn from before the test does not count.
@@ -73,11 +73,8 @@ impl FrozenTorqueState {
             product_of_three(product(speed.fixed(), speed.fixed()), turn.fixed())
         };
         let turn = self.most.minus(self.least);
-        let is_found = self.lasted >= LASTS && at(speed, turn) > at(SLOW, most_turn);
-        if is_found {
-            self.lasted = FOUND;
-        }
-        !is_found
+        self.is_found = self.lasted >= LASTS && at(speed, turn) > at(SLOW, most_turn);
+        !self.is_found
     }
 
     /// Starts to count from this angle.
