@@ -168,4 +168,21 @@ mod tests {
             assert_eq!(alive, !was_tested);
         }
     }
+
+    /// The wheel has to turn within two seconds of the torque's last change, or of the last time that they passed: at two
+    /// seconds themselves the turn begins anew.
+    #[test]
+    fn a_turn_counts_for_less_than_two_seconds() {
+        for sign in [1.0, -1.0] {
+            for (second_ms, alive) in [(999, false), (1000, true), (1001, true)] {
+                let mut state = FrozenTorqueState::default();
+                let mut still = |deg: f64, ms: u32| {
+                    let wheel = Radians::from_rad((sign * deg).to_radians());
+                    state.is_alive(Torque::from_nm(0.3), wheel, SLOW, Micros::from_ms(ms), false)
+                };
+                assert!(still(0.0, 0) && still(5.0, 1000) && still(5.0, second_ms));
+                assert_eq!(still(9.0, 1), alive, "{sign} {second_ms}");
+            }
+        }
+    }
 }
