@@ -260,3 +260,18 @@ fn a_column_that_turns_as_the_wheel_says_is_not_blamed_for_a_doubtful_yaw_rate()
         assert!(lacking(sign * 0.0076, 1, rate) < 1e-6);
     }
 }
+
+/// A hand of 20 N.m and more on a column that stands still, less friction of 0.5 N.m: 0.6 N.m.s is beyond after 31 ms, to
+/// either side. What is more than 20 N.m counts as 20.
+#[test]
+fn a_driver_torque_of_more_than_any_hand_has_is_found_on_either_side() {
+    for nm in [20.0, 25.0, 30.0, -20.0, -25.0, -30.0] {
+        let mut state = PlausibilityState::NEW;
+        CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), None);
+        let found = (0..100).find(|ms| {
+            let (now, driver) = (Instant::from_us(1000 * ms), Torque::from_nm(nm));
+            !CHECKS.column(&mut state, now, driver, Radians::ZERO, Torque::ZERO)
+        });
+        assert!(found.is_some_and(|ms| (30..=34).contains(&ms)), "{nm}: {found:?}");
+    }
+}
