@@ -565,6 +565,32 @@ fn how_fast_the_line_turns_counts_soon_after_a_blink() {
     }
 }
 
+/// A vehicle that begins to turn in front of a camera that is 0.1 s late: what the turn has added to the torque since the last
+/// picture stays when no more come. From there guidance moves by 0.954 N.m/s at most, and trust takes 0.5 a second.
+#[test]
+fn what_a_late_camera_did_not_see_stays_without_pictures() {
+    for sign in [1.0, -1.0] {
+        let mut rig = beside(0.0);
+        rig.lane.age = Micros::from_ms(100);
+        rig.run(500);
+        rig.yaw_rate = Some(0.1 * sign);
+        rig.run(80);
+        rig.silent[LANE] = true;
+        let (_, lost) = rig.run_until(100, |step| step.command.faults.contains(Fault::LaneTimeout));
+        assert_eq!(lost.command.mode, Mode::Active);
+        let at_loss = rig.applied;
+        assert!(at_loss * sign < -0.1, "{at_loss}");
+        for ms in 1..100 {
+            assert_eq!(rig.tick().command.mode, Mode::Active);
+            let moved = (rig.applied - at_loss).abs();
+            assert!(
+                moved < (0.954 + 0.5 * at_loss.abs()) * 1e-3 * f64::from(ms) + 0.01,
+                "{ms} ms: {moved}"
+            );
+        }
+    }
+}
+
 /// A bend of 2.5 m/s^2 that the vehicle follows, without a picture for almost a second: the near point has come to where the line
 /// was not seen. Of a line that went straight from there it would be 0.4 m aside.
 #[test]

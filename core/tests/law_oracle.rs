@@ -272,11 +272,19 @@ fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
 }
 
 /// The controller without its bus, active from the start, on lane errors that stand still and a driver who holds against
-/// the torque: `K_1*a_1*e_y` once it has wound up.
+/// the torque: `K_1*a_1*e_y` once it has wound up, times the authority, of which what is beyond 0 to 1 does not count.
 #[test]
 fn the_controller_alone_gives_the_law() {
     let controller = Controller::new(Config::new(&Params::PAPER).unwrap());
-    for e_y in [-0.6, 0.4] {
+    for (e_y, authority, share) in [
+        (-0.6, 1.0, 1.0),
+        (0.4, 1.0, 1.0),
+        (0.4, 0.5, 0.5),
+        (0.4, 1.5, 1.0),
+        (-0.6, 1.5, 1.0),
+        (0.4, -0.5, 0.0),
+        (-0.6, -0.5, 0.0),
+    ] {
         let mut state = ControllerState::engaged(Instant::from_us(0));
         let mut applied = Torque::ZERO;
         for ms in 1..=3000 {
@@ -294,7 +302,7 @@ fn the_controller_alone_gives_the_law() {
                 motion: Input::New(Motion::new([Speed::from_m_per_s(20.0); 2], None)),
                 request: Input::New(Request {
                     engage: true,
-                    authority: Ratio::from_si(1.0),
+                    authority: Ratio::from_si(authority),
                     probe: false,
                 }),
                 faults: FaultSet::NONE,
@@ -303,7 +311,7 @@ fn the_controller_alone_gives_the_law() {
             assert_eq!(command.mode, Mode::Active, "{ms} {command:?}");
             applied = command.torque;
         }
-        let wanted = Params::PAPER.k_1 * Params::PAPER.a_1 * e_y;
+        let wanted = Params::PAPER.k_1 * Params::PAPER.a_1 * e_y * share;
         assert!((applied.nm() - wanted).abs() < 1e-3, "{} {wanted}", applied.nm());
     }
 }

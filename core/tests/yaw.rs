@@ -43,6 +43,29 @@ fn declared(rig: &mut Rig) -> Option<u32> {
     })
 }
 
+/// Who sends no yaw rate any more does not lie. What was distrusted, for 13 m/s2 to the side, stays so until it has agreed for
+/// 3 s, and no time without it counts.
+#[test]
+fn a_yaw_rate_that_is_not_sent_is_no_fault() {
+    for sign in [1.0, -1.0] {
+        let mut rig = in_bend(0.0);
+        rig.yaw_rate = Some(0.8 * sign);
+        assert_eq!(rig.run(500).command.faults, YAW_RATE);
+        rig.yaw_rate = None;
+        rig.run(50);
+        for _ in 0..4000 {
+            let step = rig.tick();
+            assert_eq!(
+                (step.command.mode, step.command.faults),
+                (Mode::Active, FaultSet::NONE)
+            );
+        }
+        rig.yaw_rate = Some(0.0);
+        assert_eq!(rig.run(2900).command.faults, YAW_RATE);
+        assert_eq!(rig.run(200).command.faults, FaultSet::NONE);
+    }
+}
+
 /// In a bend of 0.1 rad/s: what is too much by `d` sums up to `d*(1 - exp(-t))`, beyond 0.03 and a quarter of the larger rate.
 /// The lane would be blamed sooner: 0.7*v*d*(1 - exp(-t)) m beyond 0.8 m, or 0.4 m missing. And not so soon where the line is
 /// not known yet.

@@ -201,10 +201,10 @@ impl Setup {
         }
     }
 
-    /// The same without a setup, which takes a tenth of the stack.
+    /// Checks every parameter as [`Setup::new`] does, without making a setup, which takes ten times the stack.
     ///
     /// # Errors
-    /// As those of [`Setup::new`].
+    /// The first parameter that is not a number within its range.
     #[inline(never)]
     pub const fn check(p: &Params) -> Result<(), ParamError> {
         if let Err(error) = Config::check(p) {

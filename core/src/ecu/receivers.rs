@@ -350,7 +350,7 @@ pub(super) struct Receivers {
     standing: Standing,
 }
 
-/// How slow the vehicle may be. Not kept twice: it moves nothing.
+/// How fast the vehicle is at most. Not kept twice: it moves nothing.
 #[derive(Debug, Clone, Copy)]
 struct Standing {
     /// The larger speed, which falls no faster than a vehicle brakes.

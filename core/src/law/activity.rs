@@ -124,6 +124,7 @@ fn low_pass(sum: i64, new: i64, weight: u32) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::controller::config::Config;
 
     /// A flipped bit may make anything of what is kept once.
     #[test]
@@ -150,6 +151,29 @@ mod tests {
                 against >= Ratio::ZERO && against <= Ratio::ONE,
                 "{agreement} {size}"
             );
+        }
+    }
+
+    /// The wheel goes on at 1 rad/s, but how fast it turned over a gap of 0.1 s or more nobody knows: then nothing is added to
+    /// what was felt, and it is forgotten as where the wheel stands.
+    #[test]
+    fn a_gap_between_two_samples_adds_nothing() {
+        let Some(law) = Config::PAPER.law() else {
+            panic!("the paper's law");
+        };
+        for sign in [1.0, -1.0] {
+            for (gap_ms, adds) in [(10, true), (99, true), (100, false), (500, false)] {
+                let mut activity = Activity::NEW;
+                let mut feel = |ms: u32| {
+                    let wheel = Radians::from_rad(sign * 1e-3 * f64::from(ms));
+                    let torques = [Torque::from_nm(2.0), Torque::from_nm(-2.0)];
+                    let at = Instant::from_us(1_000_000 + 1000 * ms);
+                    activity.update(law.coefficients(), at, wheel, torques);
+                    activity.size
+                };
+                let before = (0..=100).map(|step| feel(10 * step)).last();
+                assert_eq!(Some(feel(1000 + gap_ms)) > before, adds, "{sign} {gap_ms} ms");
+            }
         }
     }
 }

@@ -208,4 +208,25 @@ mod tests {
             }
         }
     }
+
+    /// An extrapolation of a second is the longest that a picture may agree with, whatever pictures came meanwhile.
+    #[test]
+    fn a_line_that_went_on_for_a_second_is_evidence_and_for_longer_is_none() {
+        for sight in [BLIND, APART] {
+            for (lost_us, verdict) in [
+                (999_999, PictureVerdict::Returned),
+                (1_000_000, PictureVerdict::Returned),
+                (1_000_001, PictureVerdict::Elsewhere),
+            ] {
+                let mut coast = Coast {
+                    sight,
+                    lost: Micros::from_us(lost_us),
+                    ..Coast::NEW
+                };
+                let sample = LaneSample::default();
+                let arrived = coast.picture_arrived(&sample, [true, true], Torque::ZERO);
+                assert_eq!(arrived, verdict, "{lost_us}");
+            }
+        }
+    }
 }

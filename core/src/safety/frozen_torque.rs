@@ -23,8 +23,6 @@ pub const MOST_TURN: Radians = Radians::from_rad(0.14);
 pub const SLOW: Speed = Speed::from_m_per_s(40.0 / 3.6);
 /// How far it may turn in Standby and beside the probe: 0.5 deg, five steps of an ordinary sensor.
 pub const MOST_TURN_WHEN_TESTED: Radians = Radians::from_rad(0.0087);
-/// Marks a torque that was found frozen, until it changes.
-const FOUND: Micros = Micros::from_us(u32::MAX);
 
 /// How long the driver torque has been the same to the bit, and between which angles the wheel was meanwhile. This
 /// state is not kept twice: a flipped bit can end guidance by a handover, or delay a finding by two seconds.
@@ -35,6 +33,8 @@ pub struct FrozenTorqueState {
     most: Radians,
     lasted: Micros,
     is_tested: bool,
+    /// It was found frozen, and has not changed since.
+    is_found: bool,
 }
 
 impl FrozenTorqueState {
@@ -50,11 +50,11 @@ impl FrozenTorqueState {
         is_tested: bool,
     ) -> bool {
         if torque != self.torque {
-            (self.torque, self.is_tested) = (torque, is_tested);
+            (self.torque, self.is_tested, self.is_found) = (torque, is_tested, false);
             self.restart(wheel);
             return true;
         }
-        if self.lasted == FOUND {
+        if self.is_found {
             return false;
         }
         // A turn from before the test does not count.
@@ -73,11 +73,8 @@ impl FrozenTorqueState {
             product_of_three(product(speed.fixed(), speed.fixed()), turn.fixed())
         };
         let turn = self.most.minus(self.least);
-        let is_found = self.lasted >= LASTS && at(speed, turn) > at(SLOW, most_turn);
-        if is_found {
-            self.lasted = FOUND;
-        }
-        !is_found
+        self.is_found = self.lasted >= LASTS && at(speed, turn) > at(SLOW, most_turn);
+        !self.is_found
     }
 
     /// Starts to count from this angle.
@@ -169,6 +166,23 @@ mod tests {
             let (torque, passed) = (Torque::from_nm(0.1), Micros::from_ms(200));
             let alive = state.is_alive(torque, wheel(2.0), SLOW, passed, true);
             assert_eq!(alive, !was_tested);
+        }
+    }
+
+    /// The wheel has to turn within two seconds of the torque's last change, or of the last time that they passed: at two
+    /// seconds themselves the turn begins anew.
+    #[test]
+    fn a_turn_counts_for_less_than_two_seconds() {
+        for sign in [1.0, -1.0] {
+            for (second_ms, alive) in [(999, false), (1000, true), (1001, true)] {
+                let mut state = FrozenTorqueState::default();
+                let mut still = |deg: f64, ms: u32| {
+                    let wheel = Radians::from_rad((sign * deg).to_radians());
+                    state.is_alive(Torque::from_nm(0.3), wheel, SLOW, Micros::from_ms(ms), false)
+                };
+                assert!(still(0.0, 0) && still(5.0, 1000) && still(5.0, second_ms));
+                assert_eq!(still(9.0, 1), alive, "{sign} {second_ms}");
+            }
         }
     }
 }

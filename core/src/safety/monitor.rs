@@ -156,7 +156,7 @@ pub const ASTRAY_MS: i32 = 20;
 /// In Active no torque may follow from lane data older than this: the age of a sample on arrival, and three periods
 /// of the slowest camera.
 const OLDEST_LANE_US: i32 = 360_000;
-/// How much longer the lane may be extrapolated: a second without a picture, and 0.3 s in which the torque falls
+/// How much longer the lane may be extrapolated: a second without a picture, and 0.4 s in which the torque falls
 /// where pictures then show another line. The band is wider by 1 mN.m for each millisecond since the last picture.
 const COAST_US: i32 = 1_400_000;
 /// A camera is silent after this time without a picture, and after two and a half of its periods: both are shorter than any time-out

@@ -98,11 +98,11 @@ impl LaneState {
 /// How the near-point error moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LaneMotion {
-    /// As predicted.
+    /// It moved as predicted.
     Consistent,
-    /// As wheel angle and speed predict, but not as the yaw rate does.
+    /// It moved as wheel angle and speed predict, but not as the yaw rate does.
     ContradictsYawRate,
-    /// As neither predicts.
+    /// Neither as the yaw rate predicts nor as wheel angle and speed do.
     Inconsistent,
 }
 
@@ -293,7 +293,8 @@ impl Plausibility {
         product_below(reach, turning.fixed())
     }
 
-    /// The same rate where the line's direction is not known: it is assumed to bend as the vehicle turns.
+    /// The rate that the near-point error must have where the line's direction is not known: the line is assumed to bend as
+    /// the vehicle turns.
     fn bend_rate(&self, state: &PlausibilityState, e_theta: Radians) -> I8F24 {
         let heading = saturate(product(state.motion.speed.fixed(), e_theta.fixed()));
         let far = saturate(product(self.far_time.fixed(), state.motion.speed.fixed()));

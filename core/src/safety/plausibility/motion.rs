@@ -82,12 +82,12 @@ impl PlausibilityState {
     /// Compares two speeds that arrive `passed` after the last ones. Returns whether they agree, and whether they
     /// have agreed at some time within `SPEEDS_PATIENCE`.
     #[must_use]
-    pub fn speeds_agree(&mut self, [a, b]: [Speed; 2], elapsed: Micros) -> (bool, bool) {
+    pub fn speeds_agree(&mut self, [a, b]: [Speed; 2], passed: Micros) -> (bool, bool) {
         let agree = speeds_agree(a, b);
         let apart = if agree {
             0
         } else {
-            self.motion.apart.us().saturating_add(elapsed.us())
+            self.motion.apart.us().saturating_add(passed.us())
         };
         self.motion.apart = Micros::from_us(apart);
         (agree, apart <= SPEEDS_PATIENCE.us())

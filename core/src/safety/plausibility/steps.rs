@@ -9,7 +9,7 @@ use crate::quantity::{Metres, Micros, Radians, Speed, per_second};
 /// Largest change of the near-point error between two samples that is accepted: 0.3 m, nine times the change in 8.3
 /// ms at 40 m/s and a yaw error of 0.1 rad.
 pub const LANE_STEP: Metres = Metres::from_m(0.3);
-/// Likewise for the yaw error: 0.1 rad in 8.3 ms would be 12 rad/s.
+/// Largest change of the yaw error between two samples that is accepted: 0.1 rad in 8.3 ms would be 12 rad/s.
 pub const YAW_STEP: Radians = Radians::from_rad(0.1);
 /// Largest change of a speed between two messages that is accepted: 1 m/s in 10 ms is 10 g.
 pub const SPEED_STEP: Speed = Speed::from_m_per_s(1.0);
