@@ -115,11 +115,14 @@ impl Product {
 
     /// Lets a period pass, by the ECU's own frames.
     fn wait(&mut self) -> Result<(), PilError> {
-        let until = Instant::now() + REPLY_TIMEOUT;
+        let begun = Instant::now();
+        let until = begun + REPLY_TIMEOUT;
+        // Frames that waited here while this computer was busy are counted at once: then its own clock says how long to wait.
+        let period = Duration::from_millis(PERIOD.into());
         let mut left = PERIOD;
-        while left > 0 && Instant::now() < until {
+        while (left > 0 || begun.elapsed() < period) && Instant::now() < until {
             let frame = self.port.frame()?;
-            left -= u32::from(frame.is_some_and(|frame| frame.id() == Guidance::ID));
+            left = left.saturating_sub(frame.is_some_and(|frame| frame.id() == Guidance::ID).into());
         }
         Ok(())
     }

@@ -125,7 +125,10 @@ impl Contents {
     /// # Errors
     /// No value of any channel, with what there is otherwise.
     fn not_empty(self) -> Result<Self, RecordingError> {
-        if let Self::Channels(recording) = &self {
+        // Where none of the channels is wanted, whoever wants others names them.
+        if let Self::Channels(recording) = &self
+            && recording.unread.is_empty()
+        {
             let mut channels = recording.groups.iter().flat_map(|group| &group.channels);
             if channels.all(|channel| channel.values.iter().all(|value| value.is_nan())) {
                 let aside = recording.notes.aside();
