@@ -470,7 +470,9 @@ fn live_says_of_a_recorded_bus_what_changed_and_when() {
     // For a second guidance goes on without a picture, and in another the torque is zero.
     let handover = when("mode Active -> Handover");
     assert!((handover - lost - 1.0).abs() < 0.0015, "{handover}");
-    assert_eq!(when("driver warning: take over"), handover);
+    // The driver is warned from 0.2 s without a picture on.
+    let warned = when("driver warning: take over");
+    assert!((warned - lost - 0.2).abs() < 0.0015, "{warned} {lost}");
     let over = when("mode Handover -> Standby");
     assert!((over - lost - 2.0).abs() < 0.01, "{over}");
     let statuses = lines.iter().filter(|line| line["status"].is_object());

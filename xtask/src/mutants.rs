@@ -58,7 +58,7 @@ const TESTS: &[(&str, &[&str])] = &[
     ("ecu/another_law", &["another_law"]),
     (
         "ecu/counting",
-        &["interleaved", "honest", "attacks", "senders", "reference"],
+        &["interleaved", "honest", "attacks", "senders"],
     ),
     ("ecu/injection", &["ecu", "memory", "monitor", "edges"]),
     (

@@ -49,8 +49,6 @@ typedef enum hg_status {
     HG_REJECT_OWN_IDENTIFIER = 24, /* somebody else sends under an identifier of this ECU */
     HG_REJECT_TOO_FAST = 25,    /* the counter goes faster than time and jitter allow */
     HG_REJECT_TWO_SENDERS = 26, /* two senders under one identifier: neither is believed */
-    HG_REJECT_TOO_FAST = 25,    /* the counter goes faster than time and jitter allow */
-    HG_REJECT_TWO_SENDERS = 26, /* two senders under one identifier: neither is believed */
     HG_REJECT_OTHER = 31        /* a reason that this header does not know */
 } hg_status;
 

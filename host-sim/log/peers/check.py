@@ -266,7 +266,7 @@ def refused():
         said = host_sim("convert", bad / name, WORK / "never.csv", code=2)
         assert said.startswith(f"error: {bad / name}: ") and said.count("\n") == 1, said
     for arguments, words in (
-        (("identify", WORK / "bench.mf4"), ["bench.mf4: there is no channel e_y_m", "--map e_y_m=CHANNEL"]),
+        (("identify", WORK / "bench.mf4"), ["bench.mf4: there are no channels e_y_m", "--map NAME=CHANNEL"]),
         (("identify", WORK / "run.mf4", "--map", "e_y_m=yaw_rate_rad_per_s"), ["yaw_rate_rad_per_s", '"rad/s"', "one of m"]),
         (("identify", WORK / "run.mf4", "--map", "speed=x"), ["--map speed=x", "is none of time_s"]),
         (("convert", CSV, WORK / "x.xlsx"), ["x.xlsx: the extension .xlsx", ".parquet"]),

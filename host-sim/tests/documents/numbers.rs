@@ -145,8 +145,8 @@ fn the_result_in_the_readme_is_what_the_evaluation_prints() {
         format!("{:.2} m", peak.as_f64().unwrap())
     };
     let sentence = format!(
-        "of a slow driver from {} to {}. If its torque is lost at once, the peak is {}; if an input is lost and the ECU hands \
-         over within two seconds, {}.",
+        "of a slow driver in the first curve (300 m, 60 km/h) from {} to {}. If its torque is lost at once as the arc begins \
+         (70 s), the peak is {}; if an input is lost there and the ECU hands over within two seconds, {}.",
         peak("manual", "none"),
         peak("high", "none"),
         peak("high", "torque"),
