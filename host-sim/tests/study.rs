@@ -195,6 +195,6 @@ fn a_persons_drive_comes_in_once() {
     refused(
         at,
         &["study", "study.toml", "--import", "anna"],
-        "no PARTICIPANT/CONDITION=FILE.csv",
+        "no PARTICIPANT/CONDITION=FILE",
     );
 }

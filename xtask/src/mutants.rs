@@ -56,10 +56,7 @@ const TESTS: &[(&str, &[&str])] = &[
         &["ecu", "memory", "probe", "edges", "endurance", "attacks"],
     ),
     ("ecu/another_law", &["another_law"]),
-    (
-        "ecu/counting",
-        &["interleaved", "honest", "attacks", "senders"],
-    ),
+    ("ecu/counting", &["interleaved", "honest", "attacks", "senders"]),
     ("ecu/injection", &["ecu", "memory", "monitor", "edges"]),
     (
         "ecu/receivers",
