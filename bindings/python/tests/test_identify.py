@@ -71,7 +71,6 @@ def test_a_simulated_run_is_a_drive():
     ("change", "says"),
     [
         (lambda t: t.pop("e_y_m"), "e_y_m"),
-        (lambda t: t["time_s"].__setitem__(5, np.nan), "time_s"),
         (lambda t: t.update(e_y_m=t["e_y_m"][:-1]), "rows"),
         (lambda t: t.update(e_y_m=np.zeros((2, 2))), "dimensions"),
         (lambda t: t.update(wheel_angle_rad=np.degrees(t["wheel_angle_rad"])), "degrees"),
@@ -84,6 +83,12 @@ def test_columns_that_are_no_drive_are_refused(change, says):
     change(columns)
     with pytest.raises(hg.InputError, match=says):
         hg.identify(columns)
+
+
+def test_a_row_without_a_time_is_left_out_and_said_to_be():
+    columns = table(LOGS / "guided-probe-clean.csv")
+    columns["time_s"][5] = np.nan
+    assert ("1 row", "no time, in row 6", "left out") in hg.identify(columns).reading
 
 
 def test_a_stretch_and_more_parameters_can_be_asked_for():

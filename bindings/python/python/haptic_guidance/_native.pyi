@@ -10,7 +10,8 @@ from typing_extensions import Required, TypedDict, Unpack
 class SpeedTable(TypedDict, total=False):
     time_s: Sequence[float]
     place_m: Sequence[float]
-    speed_m_per_s: Required[Sequence[float]]
+    speed_m_per_s: Sequence[float]
+    speed_kmh: Sequence[float]
 
 class SegmentTable(TypedDict, total=False):
     length_m: Required[float]
@@ -149,6 +150,7 @@ class ScenarioFields(TypedDict, total=False):
     lane: int
     turn: list[str]
     speed_m_per_s: float
+    speed_kmh: float
     speed: SpeedTable
     condition: Literal["manual", "high", "mid", "low"]
     sensors: Literal["exact", "paper"]

@@ -152,7 +152,10 @@ fn points_that_make_no_sense_are_refused_by_name() {
             "time_s = [0, 9]\nplace_m = [0, 9]\nspeed_m_per_s = [16, 16]",
             "either `time_s` or `place_m`",
         ),
-        ("time_s = [0, 9]\nspeeds = [60, 60]", "`time_s` or `place_m`"),
+        (
+            "time_s = [0, 9]\nspeeds = [60, 60]",
+            "unknown field `speeds`, expected one of `time_s`, `place_m`",
+        ),
         ("speed_m_per_s = [16, 16]", "`time_s` or `place_m`"),
         ("time_s = 0\nspeed_m_per_s = 16", "each a list of numbers"),
     ] {
