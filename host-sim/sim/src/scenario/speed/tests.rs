@@ -157,7 +157,7 @@ fn points_that_make_no_sense_are_refused_by_name() {
             "unknown field `speeds`, expected one of `time_s`, `place_m`",
         ),
         ("speed_m_per_s = [16, 16]", "`time_s` or `place_m`"),
-        ("time_s = 0\nspeed_m_per_s = 16", "each a list of numbers"),
+        ("time_s = 0\nspeed_m_per_s = 16", "expected a sequence"),
     ] {
         let error = text(table).unwrap_err();
         assert!(
