@@ -169,7 +169,7 @@ fn points_that_make_no_sense_are_refused_by_name() {
     let none = |name: &str, _: &_| -> Result<Course, _> { Err(InputError::new(name, "not there")) };
     let error = Scenario::from_toml("s.toml", both, none).unwrap_err().to_string();
     assert!(
-        error.contains("either speed_m_per_s or a table [speed]"),
+        error.contains("one of speed_m_per_s, speed_kmh and a table [speed] is wanted"),
         "{error}"
     );
     // Behind the end of the road nothing is wrong: the run ends before.
