@@ -6,6 +6,7 @@ use crate::controller::inputs::{Input, Request};
 use crate::controller::memory::ChangedParts;
 use crate::lane::LaneSample;
 use crate::law::Law;
+use crate::law::activity::Sample;
 use crate::quantity::{Micros, Ratio, Torque, share_of};
 use crate::safety::envelope::{LimitReason, Situation};
 use crate::safety::faults::{Fault, FaultSet};
@@ -122,11 +123,16 @@ impl<I: Injection> Step<'_, I> {
                 coefficients,
                 least_share,
             } => {
+                let sample = match &self.inputs.column {
+                    Input::New(column) => Some(Sample {
+                        at: self.now,
+                        wheel: column.wheel_angle,
+                        torques: [column.driver_torque, asked],
+                    }),
+                    Input::Held(_) | Input::Lost => None,
+                };
                 let activity = &mut self.once.activity;
-                if let Input::New(column) = &self.inputs.column {
-                    let torques = [column.driver_torque, asked];
-                    activity.update(coefficients, self.now, column.wheel_angle, torques);
-                }
+                activity.step(coefficients, sample);
                 activity.share(*least_share)
             }
         }
