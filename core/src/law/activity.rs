@@ -13,6 +13,8 @@
 //! `T_9` is what (9) asks for, before any share of it is taken: the torque applied would fall with the share, and with it the power
 //! that the share is computed from. The share only takes away, so that every bound on (9) holds for it too.
 //!
+//! A sample of the column is felt in the step after it, with the `T_9` of the step in which it came.
+//!
 //! Its memory is not kept twice: whatever a flipped bit makes of it, the share is one from lambda_min to 1, and is right again
 //! when the low-passes have forgotten.
 //!

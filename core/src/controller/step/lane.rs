@@ -80,6 +80,7 @@ impl<I: Injection> Step<'_, I> {
         self.changed.add(ChangedParts::LANE);
     }
 
+    /// How a picture compares with the line that was extrapolated, and with another line that was watched.
     fn compared(&mut self, last: &LaneSample, sample: &LaneSample) -> Compared {
         if self.memory.coast.may_agree()
             && lane_step_is_possible(&self.extrapolated_lane(last, sample.at), sample)

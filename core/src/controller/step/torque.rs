@@ -86,8 +86,9 @@ impl<I: Injection> Step<'_, I> {
             .step(&mut self.memory.fast.probe, self.elapsed, wanted)
     }
 
-    /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
-    /// ends guidance then. Without a lane the torque is zero.
+    /// The torque of (9) times four shares: the authority that the host asks for, that of the schedule at this speed, the trust in
+    /// the lane, and what the law leaves. Without a request the authority is 1: the mode ends guidance then. Without a lane the
+    /// torque is zero.
     fn guidance(&mut self) -> Torque {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !self.memory.law.is_latest(&sample) {
