@@ -85,7 +85,7 @@ const STAGES: &[Stage] = stages! {
     "fmu" Beside "the FMUs, judged by FMPy": || fmu::check(Built::ForTests);
     "c" Beside "the C library and its header, on the host and in QEMU": || c_library::check(Built::ForTests);
     "bindings-agree" Beside "the same frames from every binding": || bindings_agree::check(Built::ForTests);
-    "requirements" Beside "every requirement has its evidence": || trace::run(false);
+    "requirements" Beside "every requirement has its evidence": || trace::run();
     "evidence" Beside "the documents' tables of figures are those that were measured": evidence::check;
     "xtask" Beside "tests of xtask itself": xtask_tests;
     "dependencies" Beside "licences, bans and sources of dependencies": policy::dependencies;

@@ -123,9 +123,9 @@ enum Command {
     },
     /// Requirements (docs/requirements.toml): exit code 1 if evidence is missing, or something has no requirement.
     Trace {
-        /// Write docs/requirements.md.
-        #[arg(long)]
-        bless: bool,
+        /// Print the requirements as a table in Markdown, as the book has them, and check nothing.
+        #[arg(long, conflicts_with = "ran")]
+        page: bool,
         /// Judge every requirement by what ran in the last `cargo xtask ci`; JUnit's XML in target/ci/requirements.xml.
         #[arg(long)]
         ran: bool,
@@ -207,7 +207,8 @@ fn main() -> ExitCode {
             Err(error) => Err(error),
         },
         Command::Trace { ran: true, .. } => trace::by_execution(&ci::logs()),
-        Command::Trace { bless, .. } => trace::run(bless),
+        Command::Trace { page: true, .. } => trace::page().map(|page| print!("{page}")),
+        Command::Trace { .. } => trace::run(),
         Command::RealDrives { directory } => real_drives(&directory),
         Command::Book => book::build(),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
