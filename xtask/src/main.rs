@@ -6,6 +6,7 @@ mod bench;
 mod bindings_agree;
 mod boards;
 mod book;
+mod built;
 mod by_hand;
 mod c_library;
 mod callgrind;
@@ -41,7 +42,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::tool::Built;
+use crate::built::Built;
 
 /// The one door for builds, tests, QEMU, sizes and benchmarks.
 #[derive(Parser)]
