@@ -204,7 +204,7 @@ fn parameters_are_refused_at_any_speed_but_standstill() {
             mode: step.command.mode,
             stands: rig.ecu.stands(),
             settled: true,
-            in_use: 0,
+            in_use: None,
             now_ms: 1100,
         };
         let mut download = Download::NEW;

@@ -15,8 +15,9 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
 use crate::boards::Board;
+use crate::built::Built;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
-use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
+use crate::tool::{self, SHAPE, cargo, command, root, run};
 use crate::{
     bench, bindings_agree, boards, by_hand, c_library, coverage, evidence, fmu, gate, logs, mutants, policy,
     profiles, python, trace, venv, web, wheel,
@@ -134,7 +135,7 @@ pub(crate) fn check(options: &Options) -> Result<()> {
     if options.here || wanted.len() == 1 {
         let ended = wanted.iter().try_for_each(|stage| (stage.run)());
         if let Some(seconds) = processor_time_s() {
-            println!("{PROCESSOR_TIME}{seconds:.0} s");
+            println!("{}{seconds:.0} s", trace::PROCESSOR_TIME);
         }
         return ended;
     }
@@ -213,7 +214,7 @@ fn in_its_own_process(stage: &Stage, begin: Instant) -> bool {
             let time = text
                 .lines()
                 .rev()
-                .find_map(|line| line.strip_prefix(PROCESSOR_TIME));
+                .find_map(|line| line.strip_prefix(trace::PROCESSOR_TIME));
             let time = time
                 .map(|time| format!(", {time} of processor time"))
                 .unwrap_or_default();
@@ -271,9 +272,6 @@ fn run_logged(name: &str, log: &std::path::Path) -> Result<()> {
         .stderr(file.try_clone()?)
         .stdout(file))
 }
-
-/// What a stage says last of itself.
-pub(crate) const PROCESSOR_TIME: &str = "processor time: ";
 
 /// Of this process and of those that it waited for, where Linux says it: its fields 14 to 17 of `stat`, in hundredths of a
 /// second.

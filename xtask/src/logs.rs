@@ -2,7 +2,8 @@
 
 use anyhow::Result;
 
-use crate::tool::{Built, command, root, run};
+use crate::built::Built;
+use crate::tool::{command, root, run};
 use crate::venv;
 
 const SCENARIO: &str = "examples/relying-driver.toml";

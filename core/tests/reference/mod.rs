@@ -103,6 +103,8 @@ struct Activity {
     rate: f64,
     agreement: f64,
     size: f64,
+    /// What came in the step before: its instant, and what (9) asked for then.
+    pending: Option<(i64, receivers::Column, f64)>,
 }
 
 #[derive(Debug, Clone, Copy)]

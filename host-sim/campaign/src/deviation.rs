@@ -9,10 +9,6 @@ use super::drivers::{LANE_EDGE_M, OFF_ROAD_M};
 use super::ecu_harness::EcuHarness;
 use super::table::Class;
 
-/// A run ends so long after the onset, ms.
-pub(super) const AFTER_MS: u32 = 5200;
-/// The same where a lie takes its time, ms.
-pub(super) const LONG_AFTER_MS: u32 = 9000;
 /// A driver who is warned drives as manually so much later, ms.
 const NOTICES_MS: u32 = 1000;
 /// Most that a handover may move the vehicle beyond what dropping the torque in the same step does, m.

@@ -15,10 +15,14 @@ use haptic_sim::models::nonlinear::WorldParameters;
 use serde::Serialize;
 
 use super::bytes::{FAULT, HANDOVER};
-use super::deviation::AFTER_MS;
 use super::drivers::Limits;
 use super::injection::{Hand, Injection, Motor, Start};
 use super::residual::Detectability;
+
+/// A run ends so long after the onset, ms.
+pub(super) const AFTER_MS: u32 = 5200;
+/// A run with a lie that takes its time ends so long after the onset, ms.
+pub(super) const LONG_AFTER_MS: u32 = 9000;
 
 /// Rows, one line each: name, what is injected, the injections, and what is other than in a row that goes on ([`build`]).
 macro_rules! rows {

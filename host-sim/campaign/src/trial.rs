@@ -18,14 +18,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use super::deviation::{Deviation, LONG_AFTER_MS, drive};
+use super::deviation::{Deviation, drive};
 use super::drivers::{Driver, Drivers, everyone, lane_keeper, relying};
 use super::ecu_harness::EcuHarness;
 use super::injection::Start;
 use super::invariants::Violation;
 use super::roads::{self, ChangingRoad, TURN_KMH};
 use super::speed_change::SpeedChange;
-use super::table::{FaultCase, PlaceOnRoad};
+use super::table::{FaultCase, LONG_AFTER_MS, PlaceOnRoad};
 use super::trial_record::EcuTrace;
 use super::verdict::judge;
 use haptic_core::controller::params::{LAWS, Params};

@@ -4,7 +4,7 @@
 //! installed. Results go to stdout, all else (progress, where the files are, what is wrong) to stderr; with `--json`
 //! stdout holds one JSON object.
 //!
-//! One file per command; their groups in `--help` and their older names are in `names`. Not here: anything that a study or a model decides.
+//! One file per command; their groups in `--help` are in `names`. Not here: anything that a study or a model decides.
 
 mod adaptation;
 mod availability;

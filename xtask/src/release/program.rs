@@ -9,7 +9,8 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::archive::{self, Entry};
 use super::{Part, Release, copy_into};
-use crate::tool::{ALL_FORMATS, Built, HOST_SIM, command, llvm, output, root, run};
+use crate::built::Built;
+use crate::tool::{ALL_FORMATS, HOST_SIM, command, llvm, output, root, run};
 use crate::{dist, venv, wheel};
 
 /// The archive: program, examples, and a page that says what to do first.
