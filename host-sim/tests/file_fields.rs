@@ -35,7 +35,7 @@ impl DocumentedField {
         }
     }
 
-    /// As an error names it: of a list, the value in the second place.
+    /// The name that an error gives it: of a list, the value in the second place.
     fn refused(&self) -> String {
         let place = if self.table == "speed" { " (point 2)" } else { "" };
         self.name() + place
