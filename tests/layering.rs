@@ -90,7 +90,7 @@ const OUTSIDERS: &[(&str, &[&str])] = &[
 /// The command line's own: nothing beside `cli` uses them.
 const COMMAND_LINE: &[&str] = &["clap", "indicatif", "ctrlc", "terminal_size"];
 
-fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
@@ -100,7 +100,7 @@ fn sources(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-fn sources_below(dir: &Path) -> Vec<PathBuf> {
+pub(crate) fn sources_below(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(dir).unwrap_or_else(|e| panic!("{}: {e}", dir.display())) {
         let path = entry.unwrap().path();

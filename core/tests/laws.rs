@@ -183,7 +183,7 @@ fn the_ecu_gives_what_the_chosen_law_asks_for() {
 enum Hands {
     /// Works against 0.3 N.m of guidance with 0.4 N.m, and moves the wheel by 3 mrad at 8 Hz.
     Against,
-    /// With it.
+    /// Works in the direction of the guidance.
     With,
     /// Holds against it, and the wheel stands.
     Holding,

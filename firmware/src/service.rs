@@ -29,7 +29,7 @@ const REJECTION_AT: u32 = 75;
 /// What has to do with parameters.
 pub struct Service {
     download: Download,
-    /// As the download sees it, of the last step.
+    /// The mode of the last step, which the download asks for.
     mode: Mode,
     found: Found,
     /// The set in use; None while the controller is locked for want of one.
@@ -40,7 +40,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// Of an ECU that starts up so, with what lies in its memory and the set that it uses.
+    /// The service of an ECU that starts up so, with what lies in its memory and the set that it uses.
     #[must_use]
     pub const fn new(found: Found, in_use: Option<Params>, boot: Boot) -> Self {
         Self {

@@ -236,7 +236,7 @@ fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
-/// The same of one scenario, whose law is named at the end of the figures' names.
+/// The figures of one scenario, whose law is named at the end of their names.
 fn in_lock_step(board: Board, built: Built, scenario: &str, law: &str) -> Result<Vec<Figure>> {
     let text = tool::output(
         tool::command(&built.host_sim()?.to_string_lossy())

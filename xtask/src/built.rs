@@ -10,7 +10,7 @@ use crate::tool::{HOST_SIM, SHAPE, cargo, root, run};
 /// Which build of a binding is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Built {
-    /// With everything else, as [`SHAPE`] has it: in CI it is there already.
+    /// Built with everything else, as [`SHAPE`] has it: in CI it is there already.
     ForTests,
     /// By itself, in the profile of the tests: as the README's first command builds it.
     Daily,

@@ -273,8 +273,8 @@ fn run_logged(name: &str, log: &std::path::Path) -> Result<()> {
         .stdout(file))
 }
 
-/// Of this process and of those that it waited for, where Linux says it: its fields 14 to 17 of `stat`, in hundredths of a
-/// second.
+/// Processor time of this process and of those that it waited for, where Linux says it: its fields 14 to 17 of `stat`,
+/// in hundredths of a second.
 fn processor_time_s() -> Option<f64> {
     let stat = fs::read_to_string("/proc/self/stat").ok()?;
     let (_, fields) = stat.rsplit_once(')')?;
@@ -357,7 +357,7 @@ fn images() -> Result<()> {
     Ok(())
 }
 
-/// With the doctests of every library.
+/// Tests of the workspace, with the doctests of every library.
 fn tests() -> Result<()> {
     tool::ensure(&TOOLS)?;
     run(cargo().arg("test").args(SHAPE).arg("--no-fail-fast"))

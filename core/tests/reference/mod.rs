@@ -47,7 +47,7 @@ fn near(value: f64) -> f64 {
     (value / LSB).round() * LSB
 }
 
-/// The same, down.
+/// A value rounded down to the core's resolution.
 fn down(value: f64) -> f64 {
     (value / LSB).floor() * LSB
 }

@@ -19,7 +19,7 @@ pub(crate) const MOST_EXCESS_M: f64 = 0.1;
 pub struct Deviation {
     /// Largest deviation, m.
     pub faulted_m: f64,
-    /// The same had the torque been dropped in the step in which the ECU left; `None` if it stayed.
+    /// Largest deviation had the torque been dropped in the step in which the ECU left, m; `None` if it stayed.
     pub dropped_m: Option<f64>,
     /// Largest distance from the vehicle whose torque is cut at the onset, m: the effect of the torque after the onset. For class C only.
     pub pushed_m: Option<f64>,

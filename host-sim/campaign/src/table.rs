@@ -159,7 +159,7 @@ pub struct FaultCase {
 }
 
 impl FaultCase {
-    /// The same in a curve, where what is wrong with an input has to show.
+    /// This row in a curve, where what is wrong with an input has to show.
     #[must_use]
     pub fn in_a_curve(&self) -> Self {
         Self {
@@ -240,7 +240,8 @@ const CONTRADICTION_MS: u32 = 200;
 /// From the instant in which the motor delivers what no honest one would, if it goes on: 10 ms of patience, two
 /// periods of the column, and the cycle in which it is seen.
 const MOTOR_MS: u32 = 15;
-/// The same where torque is missing: 50 ms of patience, two periods of the column, and the cycle in which it is seen.
+/// From the instant in which torque is missing: 50 ms of patience, two periods of the column, and the cycle in which it
+/// is seen.
 pub(super) const WEAK_MS: u32 = 55;
 /// Torque in ordinary curves and through a jerk of the wheel. Measured peaks are below it; the point is that
 /// no fault may draw more.

@@ -244,7 +244,7 @@ fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
     print(&serde_json::to_string_pretty(value)?)
 }
 
-/// Those of the names, all if there is none.
+/// The values of the names, all if there is no name.
 fn chosen<T>(
     option: &str,
     names: &[String],

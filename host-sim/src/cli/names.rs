@@ -98,7 +98,7 @@ mod tests {
         );
     }
 
-    /// As a terminal of 80 columns shows it: these lines are not wrapped.
+    /// A terminal of 80 columns shows each line whole: these lines are not wrapped.
     #[test]
     fn a_line_of_the_list_fits() {
         let help = grouped(Cli::command()).render_help().to_string();

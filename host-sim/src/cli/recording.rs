@@ -227,7 +227,7 @@ impl RecordingArguments {
         self.open_other(&self.log, manual, stretches)
     }
 
-    /// The same of another file, understood in the same way.
+    /// Another file, understood in the way of the first.
     pub(super) fn open_other(
         &self,
         path: &Path,

@@ -383,7 +383,7 @@ impl Segment {
         }
     }
 
-    /// The same with a bank (rad, positive where the left edge is the higher one) and a grade (rise per distance),
+    /// The segment with a bank (rad, positive where the left edge is the higher one) and a grade (rise per distance),
     /// each at the start and at the end.
     #[must_use]
     pub fn with_surface(self, bank_rad: [f64; 2], grade: [f64; 2]) -> Self {
