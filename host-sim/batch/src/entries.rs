@@ -25,7 +25,7 @@ pub(crate) enum Entry<'a> {
     Value(&'a Value),
 }
 
-/// As CSV has it: nothing for no number, 0 or 1 for a flag.
+/// CSV has nothing for no number, and 0 or 1 for a flag.
 impl fmt::Display for Entry<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -34,7 +34,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// With its columns, empty, and with what the file's metadata say.
+    /// A table with its columns, empty, and with what the file's metadata say.
     pub(crate) fn create(
         columns: impl IntoIterator<Item = (String, EntryKind)>,
         metadata: &[(&str, &str)],
