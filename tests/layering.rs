@@ -73,23 +73,11 @@ const STUDIES: &[&str] = &[
     "sweep",
 ];
 
-/// Studies that use another one, and modules that are no study and use one: to become none.
-const STUDIES_USED: Arrows = &[
-    ("adaptation", &["compare", "study"]),
-    ("compare", &["study", "sweep"]),
-    ("design", &["experiment"]),
-    ("design_guidance", &["compare", "stability", "study"]),
-    ("entries", &["sweep"]),
-    ("error", &["sweep"]),
-    ("handover", &["evaluate"]),
-    ("identify", &["experiment"]),
-    ("parquet", &["sweep"]),
-    ("real_drives", &["availability"]),
-    ("run", &["reliance"]),
-    ("stability", &["handover"]),
-    ("study", &["experiment"]),
-    ("sweep", &["compare"]),
-];
+/// What only the engine of the studies uses: threads, and runs side by side.
+const ENGINES_OWN: [&str; 2] = ["rayon", "haptic_vectorised"];
+/// Files with runs of two kinds for a case (with the failure and without, with guidance and by hand), which ask the engine's groups for
+/// them; and a step of a run that is recorded.
+const SIDE_BY_SIDE: [&str; 3] = ["availability/drive.rs", "recorder.rs", "sweep/vectorised.rs"];
 
 /// Which of our packages each package of the workspace may depend on, without its tests.
 #[rustfmt::skip]
@@ -289,13 +277,36 @@ fn the_core_has_the_arrows_of_its_table_and_no_others() {
 }
 
 #[test]
-fn no_study_uses_another_but_those_of_the_table() {
+fn no_study_is_used_by_another_module() {
     let mut used = arrows("host-sim/batch/src");
+    for study in STUDIES {
+        assert!(
+            used.contains_key(*study) || ["bus_load", "course"].contains(study),
+            "there is no {study}"
+        );
+    }
     for to in used.values_mut() {
         to.retain(|to| STUDIES.contains(&to.as_str()));
     }
     used.retain(|_, to| !to.is_empty());
-    assert_eq!(used, as_written(STUDIES_USED));
+    assert_eq!(used, BTreeMap::new());
+}
+
+#[test]
+fn only_the_engine_of_the_studies_has_threads_and_runs_side_by_side() {
+    let src = root().join("host-sim/batch/src");
+    for path in sources(&src) {
+        let below = path.strip_prefix(&src).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let (product, _) = text
+            .split_once("#[cfg(test)]\nmod tests {")
+            .unwrap_or((&text, ""));
+        let own = tokens(product);
+        let uses = |name: &&&str| own.iter().any(|token| token == **name);
+        let hits: Vec<_> = ENGINES_OWN.iter().filter(uses).collect();
+        let may = below.starts_with("engine") || SIDE_BY_SIDE.contains(&below.to_str().unwrap());
+        assert!(may || hits.is_empty(), "{} uses {hits:?}", path.display());
+    }
 }
 
 /// Cargo refuses what a manifest does not name, so the manifests are the arrows.
@@ -439,7 +450,8 @@ const LONGEST: usize = 350;
 #[rustfmt::skip]
 const LONGER: &[(&str, &str)] = &[
     ("host-sim/batch/src/adaptation/mod.rs", "one study: maps, slopes, loops, with the results of each"),
-    ("host-sim/batch/src/experiment/mod.rs", "one study: its plan, and what is said of each participant"),
+    ("host-sim/batch/src/study/tests.rs", "what is refused, and that nothing recorded is lost"),
+    ("host-sim/batch/src/sweep/tests.rs", "one sweep file, and every way through it"),
     ("host-sim/batch/src/compare/tests.rs", "every refusal of a file beside the others"),
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
     ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
@@ -458,10 +470,9 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/analysis/src/identify/result.rs", "one document: the fields of a result"),
     ("host-sim/analysis/src/identify/search.rs", "one algorithm with its tests"),
     ("host-sim/batch/src/design.rs", "one study: question, designs, confirmation"),
-    ("host-sim/batch/src/reliance/mod.rs", "one study: drives, sessions, errors"),
     ("bindings/fmu/src/instance.rs", "one unit between its start and its end, call by call"),
     ("bindings/python/src/simulation.rs", "one class of Python, with what its steps hand out"),
-    ("host-sim/batch/src/claims.rs", "one claim beside the other, with the table that they are of"),
+    ("host-sim/batch/src/evaluate/claims.rs", "one claim beside the other, with the table that they are of"),
     ("host-sim/batch/src/sweep/effects.rs", "what is said of each field of a sweep, with its tests"),
     ("host-sim/report/src/plot/frame.rs", "one panel: where it lies, and each kind of series in it"),
     ("host-sim/report/src/plot/mod.rs", "one figure as a value: the terms that studies draw with"),
