@@ -83,7 +83,7 @@ struct Light {
     command: Link,
     law: Law,
     torque_nm: f64,
-    /// Of the decoded column frames: their reader, so that no work is optimised away.
+    /// The sum of the decoded column frames: their reader, so that no work is optimised away.
     column_sum: f64,
 }
 

@@ -160,7 +160,7 @@ impl Beside {
     }
 }
 
-/// Of the paper's driver and two others, with delays of 0.1 to 0.45 s.
+/// Drives of the paper's driver and two others, with delays of 0.1 to 0.45 s.
 fn drives(beside: Beside) -> Vec<Scenario> {
     let conditions = [Condition::Mid, Condition::High, Condition::Low];
     let delays = (0..8).map(|i| 0.1 + 0.05 * f64::from(i));

@@ -14,7 +14,7 @@ use haptic_sim::{Scenario, Simulation};
 /// Wheelbase, m, and front wheel angle per steering wheel angle.
 pub(crate) const WHEELBASE_M: f64 = 2.6;
 pub(crate) const RATIO: f64 = 1.0 / 17.0;
-/// Of the column, kg.m^2 and N.m.s/rad; its aligning torque per lateral acceleration, N.m.s^2/m.
+/// Inertia and damping of the column, kg.m^2 and N.m.s/rad; its aligning torque per lateral acceleration, N.m.s^2/m.
 const INERTIA: f64 = 0.11;
 const DAMPING: f64 = 0.57;
 pub(crate) const ALIGNING: f64 = 1.0;

@@ -330,8 +330,8 @@ fn what_is_wrong_with_the_frames_is_counted_and_not_used() {
     );
 }
 
-/// The same wheel angle turns another vehicle otherwise: the far point of a drive with another one is that driver's only
-/// if the vehicle is said.
+/// A wheel angle turns another vehicle otherwise: the far point of a drive with another one is that driver's only if
+/// the vehicle is said.
 #[test]
 fn the_far_point_is_that_of_the_vehicle_that_was_given() {
     let heavy = VehicleParameters {

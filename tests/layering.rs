@@ -7,6 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+#[path = "../xtask/src/lines.rs"]
+#[allow(dead_code, reason = "what prints the table is for xtask")]
+mod lines;
+
 /// Who uses others: name, and whom it may use.
 type Arrows = &'static [(&'static str, &'static [&'static str])];
 
@@ -114,7 +118,7 @@ const OUTSIDERS: &[(&str, &[&str])] = &[
 /// The command line's own: nothing beside `cli` uses them.
 const COMMAND_LINE: &[&str] = &["clap", "indicatif", "ctrlc", "terminal_size"];
 
-fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
@@ -124,7 +128,7 @@ fn sources(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-fn sources_below(dir: &Path) -> Vec<PathBuf> {
+pub(crate) fn sources_below(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(dir).unwrap_or_else(|e| panic!("{}: {e}", dir.display())) {
         let path = entry.unwrap().path();
@@ -443,70 +447,30 @@ fn imports_are_read_in_every_form() {
     );
 }
 
-/// Lines of a file that a reader still takes in.
-const LONGEST: usize = 350;
-
-/// Files of the libraries that are longer, and why each stays whole.
-#[rustfmt::skip]
-const LONGER: &[(&str, &str)] = &[
-    ("host-sim/batch/src/adaptation/mod.rs", "one study: maps, slopes, loops, with the results of each"),
-    ("host-sim/batch/src/study/tests.rs", "what is refused, and that nothing recorded is lost"),
-    ("host-sim/batch/src/sweep/tests.rs", "one sweep file, and every way through it"),
-    ("host-sim/batch/src/compare/tests.rs", "every refusal of a file beside the others"),
-    ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
-    ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
-    ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
-    ("core/src/ecu/receivers.rs", "what each message has to pass before it is used, beside the others"),
-    ("core/src/safety/monitor.rs", "the second computation, which stands by itself"),
-    ("core/src/ecu/mod.rs", "one step of the ECU, read from top to bottom"),
-    ("firmware/src/boards/mps2.rs", "one file for each board"),
-    ("firmware/src/boards/sam_e54_xpro.rs", "one file for each board"),
-    ("firmware/src/reset.rs", "the record that crosses a reset, with what writes, reads and repairs it"),
-    ("host-sim/analysis/src/identify/bus_trace/mod.rs", "one reader, from the trace's text to a log"),
-    ("host-sim/analysis/src/identify/log/mod.rs", "every refusal of a log beside the others"),
-    ("host-sim/analysis/src/identify/noise_model/report.rs", "everything that a fit is reported by"),
-    ("host-sim/analysis/src/identify/options.rs", "one document: the options and their ranges"),
-    ("host-sim/analysis/src/identify/paper.rs", "one published method, as it stands in the paper"),
-    ("host-sim/analysis/src/identify/result.rs", "one document: the fields of a result"),
-    ("host-sim/analysis/src/identify/search.rs", "one algorithm with its tests"),
-    ("host-sim/batch/src/design.rs", "one study: question, designs, confirmation"),
-    ("bindings/fmu/src/instance.rs", "one unit between its start and its end, call by call"),
-    ("bindings/python/src/simulation.rs", "one class of Python, with what its steps hand out"),
-    ("host-sim/batch/src/evaluate/claims.rs", "one claim beside the other, with the table that they are of"),
-    ("host-sim/batch/src/sweep/effects.rs", "what is said of each field of a sweep, with its tests"),
-    ("host-sim/report/src/plot/frame.rs", "one panel: where it lies, and each kind of series in it"),
-    ("host-sim/report/src/plot/mod.rs", "one figure as a value: the terms that studies draw with"),
-    ("host-sim/campaign/src/invariants.rs", "every rule of a cycle beside the others"),
-    ("host-sim/campaign/src/residual.rs", "the checks a second time, beside each other"),
-    ("host-sim/campaign/src/trial.rs", "one run: what is drawn, driven and judged"),
-    ("host-sim/report/src/studies/identify.rs", "one report, section by section"),
-    ("host-sim/vectorised/src/runs.rs", "one block of all runs, read from top to bottom"),
-    ("host-sim/vectorised/src/tests.rs", "one oracle, and every kind of run beside it"),
-    ("host-sim/vectorised/src/ecu.rs", "one step of the lean ECU, read from top to bottom"),
-    ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
-    ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
-    ("host-sim/sim/src/models/road/course.rs", "one document: the form of a course, with its tests"),
-];
-
+/// Who a crate grows for is asked where it passes its budget, not file by file.
 #[test]
-fn no_file_of_a_library_is_longer_than_a_reader_takes_in_without_a_reason() {
-    let mut longer = BTreeMap::new();
-    for (package, _) in PACKAGES {
-        for path in sources(&root().join(package).join("src")) {
-            let lines = std::fs::read_to_string(&path).unwrap().lines().count();
-            if lines > LONGEST {
-                longer.insert(path.strip_prefix(root()).unwrap().display().to_string(), lines);
-            }
-        }
-    }
-    for (path, why) in LONGER {
-        assert!(
-            longer.remove(*path).is_some(),
-            "{path} is short enough: strike it, and its reason ({why})"
-        );
-    }
+fn every_crate_keeps_within_its_budget_of_lines() {
+    let over = lines::by_crate(root()).unwrap();
+    let over: Vec<_> = over.iter().filter(|(_, lines, budget)| lines > budget).collect();
     assert!(
-        longer.is_empty(),
-        "longer than {LONGEST} lines: split, or a reason in LONGER: {longer:#?}"
+        over.is_empty(),
+        "crate, lines, budget: make them fewer, or give the reason with a larger budget in xtask/src/lines.rs: {over:#?}"
     );
+    let budgeted = lines::BUDGETS.map(|(place, _)| place);
+    let without: Vec<_> = PACKAGES
+        .iter()
+        .filter(|(place, _)| !budgeted.contains(place))
+        .collect();
+    assert!(without.is_empty(), "no budget: {without:?}");
+}
+
+/// Counted by hand: what is left out stands beside what is not.
+#[test]
+fn lines_are_counted_without_tests_comments_and_blanks() {
+    let text = "//! Header.\n\nuse a::b;\n/// A word.\nfn f() {\n    // Why.\n    g(); // counted\n}\n";
+    assert_eq!(lines::of_source(text), 4);
+    let tested = "#[cfg(test)]\nmod tests;\n\n#[cfg(test)]\n#[path = \"x.rs\"]\nmod tests {\n    fn f() {\n    }\n}\nfn h() {}\n";
+    assert_eq!(lines::of_source(tested), 1);
+    let inside = "impl A {\n    #[cfg(test)]\n    fn only(\n        x: u8,\n    ) -> u8 {\n        x\n    }\n    fn kept() {}\n}\n";
+    assert_eq!(lines::of_source(inside), 3);
 }

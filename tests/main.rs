@@ -26,6 +26,7 @@ mod resets;
 mod startup;
 mod track_changing_driver;
 mod unclipped;
+mod wording;
 
 use haptic_sim::scenario::GuidanceParameters;
 

@@ -122,7 +122,8 @@ fn run(target: &Target, steps: u32, host: &Params, other: &Params) -> (Report, u
     (report, guiding)
 }
 
-/// The same in cycles of another length, and the values of K_hg and its deviation that the host's telemetry carried.
+/// Runs `steps` ticks in cycles of another length. Also returns the values of K_hg and its deviation that the host's
+/// telemetry carried.
 fn run_cycles(
     target: &Target,
     steps: u32,

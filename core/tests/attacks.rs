@@ -61,7 +61,7 @@ fn a_frame_in_the_name_of_this_ecu_hands_over_and_keeps_it_from_engaging() {
     assert!(!rig.tick().command.faults.contains(Fault::OwnIdentifier));
 }
 
-/// Of sixteen old frames of the column, one of each counter, fourteen used to pass.
+/// The counter lets three of sixteen old frames of the column pass, one of each counter; fourteen used to.
 #[test]
 fn a_replayed_column_frame_passes_with_three_counters_of_sixteen() {
     let mut accepted = 0;
@@ -204,7 +204,7 @@ fn parameters_are_refused_at_any_speed_but_standstill() {
             mode: step.command.mode,
             stands: rig.ecu.stands(),
             settled: true,
-            in_use: 0,
+            in_use: None,
             now_ms: 1100,
         };
         let mut download = Download::NEW;

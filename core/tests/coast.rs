@@ -286,6 +286,31 @@ fn what_a_line_owed_is_remembered_over_a_jump() {
     }
 }
 
+/// Another line is taken when it has been watched for the 0.4 s from near point to far point, and there is no trust left. Where
+/// pictures of the line that is followed come between, the watch begins anew: the little trust that is left is gone within 0.15 s,
+/// and the other line is taken no sooner than one that is seen for the first time. The pictures of three frames are refused
+/// before.
+#[test]
+fn another_line_is_watched_anew_where_pictures_agreed_between() {
+    for sign in [1.0, -1.0] {
+        let mut rig = beside(0.0);
+        let elsewhere = Metres::from_m(0.5 * sign);
+        rig.lane.e_y = elsewhere;
+        rig.run(450);
+        rig.lane.e_y = Metres::ZERO;
+        let (_, step) = rig.run_until(100, |step| step.command.faults == FaultSet::NONE);
+        assert_eq!(step.command.mode, Mode::Active);
+        rig.run(50);
+        rig.lane.e_y = elsewhere;
+        rig.run_until(150, |step| step.command.faults.contains(Fault::LaneStep));
+        let (ms, step) = rig.run_until(600, |step| !step.command.faults.contains(Fault::LaneStep));
+        assert!((400..=440).contains(&ms), "{ms}");
+        assert_eq!(step.command.mode, Mode::Active);
+        rig.run(1500);
+        assert!((rig.applied - 0.5 * PER_M * 0.5 * sign).abs() < 0.01);
+    }
+}
+
 /// Blind for 0.8 s, then on a line elsewhere that is taken: the next 0.8 s without a picture are no more than these.
 #[test]
 fn a_new_line_begins_with_no_blindness() {

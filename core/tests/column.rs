@@ -156,8 +156,8 @@ fn the_assist_makes_five_times_of_a_driver_torque_at_most() {
     }
 }
 
-/// Of 1 N.m that lacks for 100 s half is learnt, and friction has the rest. Turned round, 1.5 N.m lack: 1 beyond friction, 0.6
-/// N.m.s after ln(1/0.4) = 0.92 s, less what is learnt anew.
+/// Half of a torque of 1 N.m that lacks for 100 s is learnt, and friction has the rest. Turned round, 1.5 N.m lack: 1
+/// beyond friction, 0.6 N.m.s after ln(1/0.4) = 0.92 s, less what is learnt anew.
 #[test]
 fn no_more_than_half_a_newton_metre_is_learnt() {
     for side in [1.0, -1.0] {

@@ -1,5 +1,7 @@
 //! A set of parameters over the bus: taken only whole, in order, in Standby and within its ranges.
 
+use std::num::NonZeroU32;
+
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Message, ParameterStatus, WriteOutcome};
 use haptic_core::bus::{Frame, Reject};
@@ -40,7 +42,7 @@ const VEHICLE: u32 = 654_321;
 /// What comes of it.
 const TAKEN: Set = Set {
     params: SET,
-    vehicle: VEHICLE,
+    vehicle: NonZeroU32::new(VEHICLE),
 };
 
 /// Where a set is taken.
@@ -48,7 +50,7 @@ const READY: Conditions = Conditions {
     mode: Mode::Standby,
     stands: true,
     settled: true,
-    in_use: 7,
+    in_use: Some(7),
     now_ms: 0,
 };
 
@@ -438,13 +440,13 @@ fn two_unlocks_at_once_unlock_nothing() {
 #[test]
 fn a_recorded_download_is_none() {
     let recorded: Vec<Frame> = [unlock(7, VEHICLE)].into_iter().chain(frames(&SET)).collect();
-    for in_use in [8, 6, 0] {
+    for in_use in [Some(8), Some(6), None] {
         let mut download = Download::NEW;
         let conditions = Conditions { in_use, ..READY };
         let taken = recorded
             .iter()
             .any(|frame| download.receive(frame, &conditions).is_some());
-        assert!(!taken, "{in_use}");
+        assert!(!taken, "{in_use:?}");
         assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
     }
 }
@@ -571,7 +573,10 @@ fn whatever_comes_a_set_is_taken_only_as_the_rules_say() {
                 () if is_bad => WriteOutcome::OutOfRange,
                 () => WriteOutcome::Taken,
             };
-            expected = (outcome == WriteOutcome::Taken).then_some(Set { params: SET, vehicle });
+            expected = (outcome == WriteOutcome::Taken).then_some(Set {
+                params: SET,
+                vehicle: NonZeroU32::new(vehicle),
+            });
             let is_whole = matches!(outcome, WriteOutcome::Taken | WriteOutcome::OutOfRange);
             let goes_on = outcome == WriteOutcome::Receiving;
             until = until.filter(|_| goes_on);

@@ -261,8 +261,8 @@ fn hands_are_told_from_none_to_the_count() {
     }
 }
 
-/// With fourteen readings to compare, a block leaves 18 pieces of work: the reading, the average, fourteen comparisons, the
-/// end of them, the report. A step does one at most, and none if it took a sample, or every other one if all do.
+/// A block with fourteen readings to compare leaves 18 pieces of work: the reading, the average, fourteen comparisons,
+/// the end of them, the report. A step does one at most, and none if it took a sample, or every other one if all do.
 #[test]
 fn a_step_does_one_piece_of_the_work() {
     let drive = Drive {

@@ -152,8 +152,8 @@ fn what_is_silent_is_not_implausible() {
     assert!(faults.contains(Fault::LaneTimeout) && !faults.contains(Fault::LaneImplausible));
 }
 
-/// Of 1.7 N.m that turn nothing friction holds 0.5: 0.54 N.m.s after 600 ms, with a memory of 1 s, of the 0.6 allowed. Without
-/// a speed no torque of the road is known.
+/// Friction holds 0.5 of 1.7 N.m that turn nothing: 0.54 N.m.s after 600 ms, with a memory of 1 s, of the 0.6 allowed.
+/// Without a speed no torque of the road is known.
 #[test]
 fn what_the_column_summed_up_ends_with_the_speed() {
     let mut rig = straight(0.0);
@@ -219,7 +219,7 @@ fn a_picture_from_before_the_line_went_on_is_waited_out() {
     assert_eq!(rig.tick().command.faults, FaultSet::NONE);
 }
 
-/// Of two speeds that are apart by 4.5 m/s nothing is believed after 0.3 s, however often they are for less.
+/// Two speeds that are apart by 4.5 m/s are not believed after 0.3 s, however often they are for less.
 #[test]
 fn speeds_that_agree_again_are_plausible() {
     let mut rig = straight(0.0);

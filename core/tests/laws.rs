@@ -9,7 +9,7 @@ use haptic_core::ecu::Boot;
 use haptic_core::ecu::injection::Region;
 use haptic_core::lane::LaneSample;
 use haptic_core::law::Coefficients;
-use haptic_core::law::activity::Activity;
+use haptic_core::law::activity::{Activity, Sample};
 use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Speed, Torque};
 use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::safety::modes::Mode;
@@ -33,6 +33,15 @@ fn coefficients(rate_corner_hz: f64) -> Coefficients {
         ..Params::PAPER
     };
     *Config::new(&params).unwrap().law().unwrap().coefficients()
+}
+
+/// A sample that came at so many microseconds, beside the torques of the driver and of (9).
+fn sample(us: u32, wheel: Radians, torques_nm: [f64; 2]) -> Sample {
+    Sample {
+        at: Instant::from_us(us),
+        wheel,
+        torques: torques_nm.map(Torque::from_nm),
+    }
 }
 
 /// Driver activity in f64.
@@ -86,8 +95,7 @@ fn the_share_of_driver_activity_is_within_0_001_of_its_equation() {
             let driver = count(scale * 2.0 * (1.3 * t + phase).sin());
             let asked = count(scale * (0.8 * t).sin());
             let wheel = Radians::from_rad(scale * 0.3 * (0.9 * t).sin());
-            let torques = [driver, asked].map(Torque::from_nm);
-            activity.update(&filter, Instant::from_us(1000 * ms), wheel, torques);
+            activity.feel(&filter, &sample(1000 * ms, wheel, [driver, asked]));
             let share = activity.share(Ratio::from_si(least)).si();
             let in_f64 = expected.share(t, wheel.rad(), driver * asked, least, corner_hz);
             assert!((least - 1e-6..=1.0).contains(&share), "{share}");
@@ -116,8 +124,8 @@ fn who_helps_has_all_and_who_works_against_it_the_least_share() {
             let mut activity = Activity::NEW;
             for ms in (0..2000_u32).step_by(2) {
                 let wheel = Radians::from_rad(1e-3 * rad_per_s * f64::from(ms));
-                let torques = [sign * driver, sign * 0.5].map(Torque::from_nm);
-                activity.update(&coefficients(10.0), Instant::from_us(1000 * ms), wheel, torques);
+                let felt = sample(1000 * ms, wheel, [sign * driver, sign * 0.5]);
+                activity.feel(&coefficients(10.0), &felt);
             }
             let share = activity.share(Ratio::from_si(0.25)).si();
             assert!((share - expected).abs() < 1e-3, "{driver}: {share}");
@@ -133,9 +141,8 @@ fn driver_activity_knows_no_rate_over_a_silence_of_the_column() {
     let share_after = |apart_us: u32| {
         let mut activity = Activity::NEW;
         for (us, wheel) in [(0, 0.0), (apart_us, 0.1)] {
-            let torques = [-1.0, 0.5].map(Torque::from_nm);
             let wheel = Radians::from_rad(wheel);
-            activity.update(&coefficients(10.0), Instant::from_us(us), wheel, torques);
+            activity.feel(&coefficients(10.0), &sample(us, wheel, [-1.0, 0.5]));
         }
         activity.share(Ratio::from_si(0.25)).si()
     };
@@ -176,7 +183,7 @@ fn the_ecu_gives_what_the_chosen_law_asks_for() {
 enum Hands {
     /// Works against 0.3 N.m of guidance with 0.4 N.m, and moves the wheel by 3 mrad at 8 Hz.
     Against,
-    /// With it.
+    /// Works in the direction of the guidance.
     With,
     /// Holds against it, and the wheel stands.
     Holding,

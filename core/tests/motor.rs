@@ -93,8 +93,8 @@ fn what_is_missing_is_weak_and_what_is_too_much_astray() {
     assert!(first.is_some_and(|ms| (518..=526).contains(&ms)), "{first:?}");
 }
 
-/// Of 1 N.m an honest motor delivers 0.775 to 1.225. Ten steps of too much are tolerated, again and again where something is
-/// missing between, or nothing wrong; and fifty of what is missing likewise.
+/// An honest motor that is told 1 N.m delivers 0.775 to 1.225. Ten steps of too much are tolerated, again and again
+/// where something is missing between, or nothing wrong; and fifty of what is missing likewise.
 #[test]
 fn too_much_and_too_little_are_counted_in_a_row() {
     for sign in [1.0, -1.0] {

@@ -95,8 +95,8 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
     }
 }
 
-/// Of messages every 2 ms the ring of 32 rates holds the last 62 ms. A vehicle that has turned until 40 ms ago is known to
-/// have turned then, and is taken to have turned as fast before.
+/// The ring of 32 rates holds the last 62 ms of messages every 2 ms. A vehicle that has turned until 40 ms ago is known
+/// to have turned then, and is taken to have turned as fast before.
 #[test]
 fn what_is_longer_ago_than_is_remembered_was_as_the_oldest_that_is() {
     for rate in [0.1, -0.1] {

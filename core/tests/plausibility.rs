@@ -42,7 +42,7 @@ enum Course {
     Curve(f64),
     /// 3 m to the left from t = 2 s on, at up to 1 m/s, with the lane left behind as the target line.
     LaneChange,
-    /// The same at 1 m/s from the start: 3 m/s2 of lateral acceleration at 120 km/h.
+    /// 3 m to the left at 1 m/s from the start: 3 m/s2 of lateral acceleration at 120 km/h.
     Swerve,
 }
 
@@ -81,7 +81,8 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
     drive_with(speed, course, side, guidance_share, sensors, from_s, None)
 }
 
-/// The same, with a measured yaw rate that is `yaw_rate_bias` off, and a camera that points 3 mrad aside.
+/// Drives 12 s, if asked for with a measured yaw rate that is `yaw_rate_bias` off, and a camera that points 3 mrad
+/// aside.
 #[expect(
     clippy::too_many_lines,
     reason = "a whole vehicle with its sensors, step by step"
@@ -229,7 +230,7 @@ fn honest_driving_is_never_declared() {
     }
 }
 
-/// The same driving with a measured yaw rate: less of the margin is used though the yaw rate is 3 mrad/s off, the camera
+/// A measured yaw rate lets honest driving use less of the margin, though the yaw rate is 3 mrad/s off, the camera
 /// points 3 mrad aside, and the wheel's angle is not looked at.
 #[test]
 fn a_measured_yaw_rate_knows_swerves_from_lies() {

@@ -1,5 +1,7 @@
 //! Parameter blocks against a CRC and a layout written a second time, and every way a copy can be spoilt.
 
+use std::num::NonZeroU32;
+
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::{Params, VehicleParams};
 use haptic_core::service::stored::{BYTES, Set, Stored};
@@ -23,7 +25,7 @@ const VEHICLE: u32 = 654_321;
 const fn set(params: Params) -> Set {
     Set {
         params,
-        vehicle: VEHICLE,
+        vehicle: NonZeroU32::new(VEHICLE),
     }
 }
 

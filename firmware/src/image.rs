@@ -23,7 +23,7 @@ pub const SEALED: u32 = 0x5EA1_E0D5;
 /// What came of the look.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// As it was built.
+    /// It is as it was built.
     Whole,
     /// Nobody has sealed it.
     Unsealed,

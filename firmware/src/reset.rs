@@ -60,9 +60,10 @@ struct Record {
 const COPY: usize = 7;
 /// Both copies as they lie in memory.
 type Words = [u32; 2 * COPY];
-/// As many ones as zeros, and far from any pattern that a memory test writes.
+/// The magic number has as many ones as zeros, and is far from any pattern that a memory test writes.
 const MAGIC: [u32; 2] = [0x57A8_1E56, 0x9C63_B12D];
-/// With fewer wrong bits of 64 a magic number is a damaged one. Noise has 32 on average; one power-up of millions has 12.
+/// A magic number with fewer wrong bits of 64 is a damaged one. Noise has 32 on average; one power-up of millions has
+/// 12.
 const NEAR_BITS: u32 = 12;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
@@ -129,7 +130,7 @@ impl Record {
         }
     }
 
-    /// With a cause to announce.
+    /// The record with a cause to announce.
     fn announcing(self, cause: ResetCause) -> Self {
         Self {
             announced: cause as u32,
@@ -137,7 +138,7 @@ impl Record {
         }
     }
 
-    /// With faults that last until power-up.
+    /// The record with faults that last until power-up.
     fn latching(self, faults: FaultSet) -> Self {
         Self {
             latched: self.latched | faults.bits(),
@@ -374,7 +375,7 @@ mod tests {
         faults
     }
 
-    /// Of memory after power-up: all zeros in QEMU, anything on a board (xorshift).
+    /// Memory after power-up: all zeros in QEMU, anything on a board (xorshift).
     fn noise() -> impl Iterator<Item = Words> {
         let mut x = 0x9E37_79B9_u32;
         let random = core::iter::repeat_with(move || {

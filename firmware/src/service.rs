@@ -1,6 +1,8 @@
 //! What an ECU says of its parameters, of itself and of frames that it did not use, and the sets that it takes over the
 //! bus. Behind the torque, which is on its way by then. Not here: where a set is stored, and the restart that it causes.
 
+use core::num::NonZeroU32;
+
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Identity, Message, Rejection};
 use haptic_core::controller::Command;
@@ -27,7 +29,7 @@ const REJECTION_AT: u32 = 75;
 /// What has to do with parameters.
 pub struct Service {
     download: Download,
-    /// As the download sees it, of the last step.
+    /// The mode of the last step, which the download asks for.
     mode: Mode,
     found: Found,
     /// The set in use; None while the controller is locked for want of one.
@@ -38,7 +40,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// Of an ECU that starts up so, with what lies in its memory and the set that it uses.
+    /// The service of an ECU that starts up so, with what lies in its memory and the set that it uses.
     #[must_use]
     pub const fn new(found: Found, in_use: Option<Params>, boot: Boot) -> Self {
         Self {
@@ -63,7 +65,7 @@ impl Service {
             mode: self.mode,
             stands: ecu.stands(),
             settled: reset::has_settled(self.boot.reset, steps),
-            in_use: self.found.stored.map_or(0, |stored| stored.sequence),
+            in_use: self.found.stored.map(|stored| stored.sequence),
             now_ms: steps,
         };
         self.download.receive(frame, &conditions)
@@ -77,8 +79,9 @@ impl Service {
             let turn = (steps / STEPS_PER_STATUS) as u8;
             let is_damaged = self.found.damaged != [false, false];
             let status = self.download.status(self.found.stored.as_ref(), is_damaged);
+            let vehicle = self.found.stored.and_then(|stored| stored.set.vehicle);
             let identity = Identity {
-                vehicle: self.found.stored.map_or(0, |stored| stored.set.vehicle),
+                vehicle: vehicle.map_or(0, NonZeroU32::get),
                 hardware: ThisBoard::hardware(),
             };
             // Three frames have three places.

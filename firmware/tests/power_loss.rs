@@ -21,7 +21,7 @@ fn set(number: u32) -> Set {
     };
     Set {
         params,
-        vehicle: 7 * number,
+        vehicle: std::num::NonZeroU32::new(7 * number),
     }
 }
 

@@ -1,5 +1,5 @@
-//! The tables of docs/files.md against the code: every field is there, its default is the code's, and a value
-//! just outside its range is refused with the table's unit and range.
+//! What docs/files.md and examples/every-field.toml say of the fields, against the code: every field is there, its default is
+//! the code's, and a value just outside its range is refused with the unit and the range that stand there.
 //!
 //! What is made of the lists of fields is compared with them, and written anew by `FIELDS=write cargo test -p host-sim
 //! file_fields::`.
@@ -12,7 +12,10 @@ use haptic_sim::input::InputError;
 use haptic_sim::models::road::{Course, SEGMENT_FIELDS};
 use haptic_sim::scenario::{Scenario, TABLES};
 
-/// A row of a table.
+/// The example that has every field with its unit, its range and its meaning.
+const EXAMPLE: &str = "examples/every-field.toml";
+
+/// A field as a document has it.
 #[derive(Debug, Clone)]
 struct DocumentedField {
     /// Table of the field in the file; empty at the top.
@@ -32,7 +35,7 @@ impl DocumentedField {
         }
     }
 
-    /// As an error names it: of a list, the value in the second place.
+    /// The name that an error gives it: of a list, the value in the second place.
     fn refused(&self) -> String {
         let place = if self.table == "speed" { " (point 2)" } else { "" };
         self.name() + place
@@ -47,8 +50,7 @@ impl DocumentedField {
 
 /// The rows below a heading of the document.
 fn rows(heading: &str) -> Vec<DocumentedField> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/files.md");
-    let text = std::fs::read_to_string(path).unwrap();
+    let text = read("docs/files.md");
     let start = text.find(&format!("\n## {heading}\n")).unwrap() + 4;
     let section = text[start..].split("\n## ").next().unwrap();
     let bare = |cell: &str| cell.trim().trim_matches('`').to_owned();
@@ -75,6 +77,55 @@ fn rows(heading: &str) -> Vec<DocumentedField> {
         .filter(|line| line.starts_with("| `"))
         .map(row)
         .collect()
+}
+
+fn read(file: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file)).unwrap()
+}
+
+/// The fields of a scenario: those of the document's table, and those of the tables in the example.
+fn fields_of_a_scenario() -> Vec<DocumentedField> {
+    let mut all = rows("Scenario");
+    let text = read(EXAMPLE);
+    let mut table = "";
+    for line in text.lines() {
+        let bare = line.trim_start_matches("# ");
+        if let Some(name) = bare.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
+            table = name;
+        } else if TABLES.iter().any(|(name, _)| *name == table) && bare.contains(" = ") {
+            all.push(example_field(table, bare));
+        }
+    }
+    all
+}
+
+/// A line of the example: `name = default # range unit: meaning`.
+fn example_field(table: &str, line: &str) -> DocumentedField {
+    let parts = |text: &'static str, line: &str| {
+        let (left, right) = line
+            .split_once(text)
+            .unwrap_or_else(|| panic!("no {text:?}: {line}"));
+        (left.to_owned(), right.to_owned())
+    };
+    let (field, rest) = parts(" = ", line);
+    let (default, rest) = parts(" # ", &rest);
+    let (range, meaning) = parts(": ", &rest);
+    assert!(!meaning.trim().is_empty(), "{line}");
+    // Behind the numbers of a range stands the unit.
+    let words: Vec<&str> = range.split(' ').collect();
+    let (range, unit) = match words[..] {
+        [from, "to", to, unit] => (format!("{from} to {to}"), unit.to_owned()),
+        _ => (range.clone(), String::new()),
+    };
+    let default = Some(default).filter(|default| default != "...");
+    let table = table.to_owned();
+    DocumentedField {
+        table,
+        field,
+        unit,
+        range,
+        default,
+    }
 }
 
 /// A scenario in which one field has a value.
@@ -126,42 +177,28 @@ fn default_of(table: &str, field: &Field) -> Option<String> {
     }
 }
 
-/// The rows of a table in the document.
-fn documented(table: &str, field: &Field) -> String {
-    let quoted = |words: &[&str]| {
-        words
-            .iter()
-            .map(|word| format!("`{word:?}`"))
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
-    let range = match field.range {
-        Range::Between(from, to) => format!("{from} to {to}"),
-        Range::OneOf(words) => quoted(words),
-        Range::Whole => "whole numbers from 0".into(),
-        Range::Flag => "`true`, `false`".into(),
-    };
-    let default = default_of(table, field).map_or("none".into(), |default| format!("`{default}`"));
-    let spaced = |cell: &str| {
-        if cell.is_empty() {
-            " ".into()
-        } else {
-            format!(" {cell} ")
-        }
-    };
-    let (symbol, unit) = (spaced(field.symbol), spaced(field.unit));
-    format!(
-        "| `{table}.{}` |{symbol}|{unit}| {range} | {default} | {} |\n",
-        field.name,
-        field.meaning.trim()
-    )
-}
-
 /// A field in the example that has every field; what has no default is a comment.
 fn exemplified(table: &str, field: &Field) -> String {
+    let either = |words: &[&str]| {
+        let words: Vec<_> = words.iter().map(|word| format!("{word:?}")).collect();
+        words.join(" or ")
+    };
+    let range = match field.range {
+        Range::Between(from, to) if field.unit.is_empty() => format!("{from} to {to}"),
+        Range::Between(from, to) => format!("{from} to {to} {}", field.unit),
+        Range::OneOf(words) => either(words),
+        Range::Whole => "whole numbers from 0".into(),
+        Range::Flag => "true or false".into(),
+    };
+    let letters = |text: &str| text.replace(['_', '\''], "");
+    let meaning = field.meaning.trim();
+    let meaning = match field.symbol {
+        symbol if letters(meaning).starts_with(&letters(symbol)) => meaning.to_owned(),
+        symbol => format!("{symbol}, {meaning}"),
+    };
     match default_of(table, field) {
-        Some(default) => format!("{} = {default}\n", field.name),
-        None => format!("# {} = ...\n", field.name),
+        Some(default) => format!("{} = {default} # {range}: {meaning}\n", field.name),
+        None => format!("# {} = ... # {range}: {meaning}\n", field.name),
     }
 }
 
@@ -215,18 +252,12 @@ fn made_of_the_lists(file: &str, start: impl Fn(&str) -> String, line: impl Fn(&
 }
 
 #[test]
-fn documents_and_stubs_are_made_of_the_lists() {
-    let heading = |table: &str| {
-        format!(
-            "\n`[{table}]`:\n\n| field | symbol | unit | range | default | meaning |\n|---|---|---|---|---|---|\n"
-        )
-    };
-    made_of_the_lists("docs/files.md", heading, documented);
+fn example_and_stub_are_made_of_the_lists() {
     let section = |table: &str| match table {
         "driver_change" => "\n# [driver_change]\n".into(),
         table => format!("\n[{table}]\n"),
     };
-    made_of_the_lists("examples/every-field.toml", section, exemplified);
+    made_of_the_lists(EXAMPLE, section, exemplified);
     let class = |table: &str| {
         let words = table.split('_').map(|word| word[..1].to_uppercase() + &word[1..]);
         let total = if table == "driver_change" {
@@ -241,7 +272,7 @@ fn documents_and_stubs_are_made_of_the_lists() {
 
 #[test]
 fn every_default_of_a_scenario_is_the_codes() {
-    for row in &rows("Scenario") {
+    for row in &fields_of_a_scenario() {
         if let Some(default) = &row.default {
             let text = scenario_text(row, default);
             assert_eq!(scenario(&text).as_ref(), Ok(&Scenario::default()), "{text}");
@@ -273,7 +304,7 @@ fn the_other_fields_of_a_scenario_are_in_the_table() {
 #[test]
 fn every_range_of_a_scenario_is_the_codes() {
     let mut numbers = 0;
-    for row in rows("Scenario") {
+    for row in fields_of_a_scenario() {
         let refusal = |value: &str| scenario(&scenario_text(&row, value)).err();
         if let Some([from, to]) = row.ends() {
             numbers += 1;
@@ -303,8 +334,8 @@ fn every_range_of_a_scenario_is_the_codes() {
                 let outside = format!("{} = {value}{unit} is outside", row.refused());
                 assert!(!refusal.contains(&outside), "{refusal}");
             }
-        } else if row.range.starts_with('`') {
-            for value in row.range.split(", ") {
+        } else if row.range.starts_with(['`', '"']) || row.range == "true or false" {
+            for value in row.range.replace(" or ", ", ").split(", ") {
                 let value = value.trim_matches('`');
                 assert_eq!(refusal(value), None, "{}", row.name());
             }
@@ -329,9 +360,7 @@ fn every_range_of_a_scenario_is_the_codes() {
 /// Read with its comments it is a scenario of defaults too.
 #[test]
 fn the_example_with_every_field_is_a_scenario_of_defaults() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/every-field.toml");
-    let text = std::fs::read_to_string(path).unwrap();
-    assert_eq!(scenario(&text).as_ref(), Ok(&Scenario::default()));
+    assert_eq!(scenario(&read(EXAMPLE)).as_ref(), Ok(&Scenario::default()));
 }
 
 #[test]

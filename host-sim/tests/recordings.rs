@@ -76,7 +76,7 @@ fn a_clock_that_was_set_is_refused_with_its_line_and_one_side_is_used() {
     assert!((count(&of_part) - count(&of_whole)).abs() <= 1 && count(&of_part) > 3000);
 }
 
-/// The same drive as a table of another tool: semicolons, units in brackets, another name for the speed.
+/// A drive is a table of another tool too: semicolons, units in brackets, another name for the speed.
 #[test]
 fn names_units_and_separators_of_others_are_read() {
     let directory = tempfile::tempdir().unwrap();
@@ -125,7 +125,7 @@ fn names_units_and_separators_of_others_are_read() {
     assert!(said.contains("speed_m_per_s"), "{said}");
 }
 
-/// As polars writes it by default.
+/// The file has what polars writes by default.
 #[test]
 fn a_parquet_file_of_polars_is_listed_with_its_units() {
     let directory = tempfile::tempdir().unwrap();

@@ -7,7 +7,8 @@ use std::process::Stdio;
 
 use anyhow::{Context, Result, bail};
 
-use crate::tool::{Built, command, output, root, run};
+use crate::built::Built;
+use crate::tool::{command, output, root, run};
 use crate::{c_library, fmu, python, web};
 
 const SCENARIO: &str = "examples/relying-driver.toml";

@@ -8,13 +8,14 @@ use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 
+use crate::built::Built;
 use crate::code::{CONTROLLER, Code, PRODUCT};
 use crate::golden::{self, Figure};
 use crate::image::{self, Image, M4F};
 use crate::longest;
 use crate::seal;
 use crate::size;
-use crate::tool::{self, Built, Usage, cargo, run};
+use crate::tool::{self, Usage, cargo, run};
 
 /// Length of the guard below the stack (`firmware/src/stack.rs`): a larger frame could step over it.
 const GUARD: u64 = 4096;
@@ -235,7 +236,7 @@ fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
-/// The same of one scenario, whose law is named at the end of the figures' names.
+/// The figures of one scenario, whose law is named at the end of their names.
 fn in_lock_step(board: Board, built: Built, scenario: &str, law: &str) -> Result<Vec<Figure>> {
     let text = tool::output(
         tool::command(&built.host_sim()?.to_string_lossy())

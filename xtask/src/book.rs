@@ -1,21 +1,27 @@
 //! The documents as a book that can be browsed: mdBook makes it of a copy of `docs/`.
 //!
-//! In the copy a block of mathematics is set for MathJax, and a link out of `docs/` leads to a copy of its file. What the
-//! book then links to has to be there.
+//! In the copy a block of mathematics is set for MathJax, a link out of `docs/` leads to a copy of its file, and a table that a
+//! command prints stands where a page has `<!-- printed: COMMAND -->`. What the book then links to has to be there.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
-use crate::tool::{self, command, root, run};
+use crate::tool::{self, Built, command, output, root, run};
+use crate::trace;
 
 const MDBOOK: &str = "mdbook";
 const INSTALL: &str = "cargo install mdbook --version 0.5.4";
 /// Files from outside `docs/` that pages lead to, below the pages.
 const OUTSIDE: &str = "repository";
+/// What stands before and behind a command whose output a page has in the book.
+const PRINTED: [&str; 2] = ["<!-- printed: ", " -->"];
+/// The commands that print a table for the book.
+const REQUIREMENTS: &str = "cargo xtask trace --page";
+const FAULTS: &str = "host-sim faults --list";
 
 /// Makes the book in `target/book/html`; an error names links that lead nowhere.
 pub(crate) fn build() -> Result<()> {
@@ -50,7 +56,9 @@ fn copy(to: &Path) -> Result<()> {
         fs::create_dir_all(target.parent().unwrap_or(to))?;
         if file.extension() == Some(OsStr::new("md")) && !file.ends_with("SUMMARY.md") {
             let folder = name.parent().unwrap_or(Path::new(""));
-            fs::write(target, page(&fs::read_to_string(&file)?, folder, &mut outside))?;
+            let text =
+                with_printed(&fs::read_to_string(&file)?).with_context(|| name.display().to_string())?;
+            fs::write(target, page(&text, folder, &mut outside))?;
         } else {
             fs::copy(&file, target)?;
         }
@@ -75,6 +83,31 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
         }
     }
     Ok(found)
+}
+
+/// The command of a line that stands for what a command prints.
+fn printed(line: &str) -> Option<&str> {
+    line.strip_prefix(PRINTED[0])?.strip_suffix(PRINTED[1])
+}
+
+/// The text with what its commands print.
+fn with_printed(text: &str) -> Result<String> {
+    let mut made = String::new();
+    for line in text.lines() {
+        match printed(line) {
+            None => made.push_str(line),
+            Some(REQUIREMENTS) => made.push_str(&trace::page()?),
+            Some(FAULTS) => {
+                let program = Built::Daily.host_sim()?;
+                made.push_str(&output(
+                    command(&program.to_string_lossy()).args(["faults", "--list"]),
+                )?);
+            }
+            Some(other) => bail!("{other}: not a command that prints a table for the book"),
+        }
+        made.push('\n');
+    }
+    Ok(made)
 }
 
 /// A page as mdBook shows it; `folder` is its place in `docs/`. Adds the files outside that it leads to, by their names from the
@@ -217,6 +250,29 @@ mod tests {
                 "docs/SUMMARY.md: no {name}"
             );
         }
+    }
+
+    #[test]
+    fn a_page_has_what_its_command_prints() {
+        let text = "a\n<!-- printed: cargo xtask trace --page -->\nb\n";
+        let made = with_printed(text).unwrap();
+        assert!(made.starts_with("a\n| identifier | requirement |") && made.ends_with("|\n\nb\n"));
+        assert!(made.contains("\n| MODE-4 | Torque is zero in Boot, Standby, Fault and Locked. |"));
+        assert!(with_printed("<!-- printed: rm -r / -->").is_err());
+    }
+
+    /// Nobody finds out first when the book is made that a page asks for a command that is not there.
+    #[test]
+    fn pages_ask_for_commands_that_are_there() {
+        let mut asked = Vec::new();
+        for file in files(&root().join("docs")).unwrap() {
+            if file.extension() == Some(OsStr::new("md")) {
+                let text = fs::read_to_string(&file).unwrap();
+                asked.extend(text.lines().filter_map(printed).map(str::to_owned));
+            }
+        }
+        asked.sort();
+        assert_eq!(asked, [REQUIREMENTS, FAULTS]);
     }
 
     #[test]

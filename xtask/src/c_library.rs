@@ -5,8 +5,9 @@ use std::process::Stdio;
 
 use anyhow::{Context, Result, bail};
 
+use crate::built::Built;
 use crate::image::{self, M4F};
-use crate::tool::{Built, cargo, command, ensure, output, root, run};
+use crate::tool::{cargo, command, ensure, output, root, run};
 
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Werror", "-pedantic"];
 const CORTEX_M4F: [&str; 4] = [

@@ -15,8 +15,9 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
 use crate::boards::Board;
+use crate::built::Built;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
-use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
+use crate::tool::{self, SHAPE, cargo, command, root, run};
 use crate::{
     bench, bindings_agree, boards, by_hand, c_library, coverage, evidence, fmu, gate, logs, mutants, policy,
     profiles, python, trace, venv, web, wheel,
@@ -85,7 +86,7 @@ const STAGES: &[Stage] = stages! {
     "fmu" Beside "the FMUs, judged by FMPy": || fmu::check(Built::ForTests);
     "c" Beside "the C library and its header, on the host and in QEMU": || c_library::check(Built::ForTests);
     "bindings-agree" Beside "the same frames from every binding": || bindings_agree::check(Built::ForTests);
-    "requirements" Beside "every requirement has its evidence": || trace::run(false);
+    "requirements" Beside "every requirement has its evidence": || trace::run();
     "evidence" Beside "the documents' tables of figures are those that were measured": evidence::check;
     "xtask" Beside "tests of xtask itself": xtask_tests;
     "dependencies" Beside "licences, bans and sources of dependencies": policy::dependencies;
@@ -134,7 +135,7 @@ pub(crate) fn check(options: &Options) -> Result<()> {
     if options.here || wanted.len() == 1 {
         let ended = wanted.iter().try_for_each(|stage| (stage.run)());
         if let Some(seconds) = processor_time_s() {
-            println!("{PROCESSOR_TIME}{seconds:.0} s");
+            println!("{}{seconds:.0} s", trace::PROCESSOR_TIME);
         }
         return ended;
     }
@@ -213,7 +214,7 @@ fn in_its_own_process(stage: &Stage, begin: Instant) -> bool {
             let time = text
                 .lines()
                 .rev()
-                .find_map(|line| line.strip_prefix(PROCESSOR_TIME));
+                .find_map(|line| line.strip_prefix(trace::PROCESSOR_TIME));
             let time = time
                 .map(|time| format!(", {time} of processor time"))
                 .unwrap_or_default();
@@ -272,11 +273,8 @@ fn run_logged(name: &str, log: &std::path::Path) -> Result<()> {
         .stdout(file))
 }
 
-/// What a stage says last of itself.
-pub(crate) const PROCESSOR_TIME: &str = "processor time: ";
-
-/// Of this process and of those that it waited for, where Linux says it: its fields 14 to 17 of `stat`, in hundredths of a
-/// second.
+/// Processor time of this process and of those that it waited for, where Linux says it: its fields 14 to 17 of `stat`,
+/// in hundredths of a second.
 fn processor_time_s() -> Option<f64> {
     let stat = fs::read_to_string("/proc/self/stat").ok()?;
     let (_, fields) = stat.rsplit_once(')')?;
@@ -359,7 +357,7 @@ fn images() -> Result<()> {
     Ok(())
 }
 
-/// With the doctests of every library.
+/// Tests of the workspace, with the doctests of every library.
 fn tests() -> Result<()> {
     tool::ensure(&TOOLS)?;
     run(cargo().arg("test").args(SHAPE).arg("--no-fail-fast"))

@@ -293,7 +293,7 @@ pub(crate) fn is_soft_float(symbol: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// As llvm-objdump prints it: a step that calls two functions, one of which jumps on.
+    /// What llvm-objdump prints of a step that calls two functions, one of which jumps on.
     const TEXT: &str = "
 08000100 <haptic_core::ecu::Ecu::receive::h01>:
  8000100:      \tbx\tlr

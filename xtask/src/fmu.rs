@@ -6,7 +6,8 @@ use std::time::{Duration, SystemTime};
 
 use anyhow::{Context, Result};
 
-use crate::tool::{Built, cargo, command, exists, output, root, run};
+use crate::built::Built;
+use crate::tool::{cargo, command, exists, output, root, run};
 use crate::{dist, python};
 
 /// A relying driver on the paper's course, as bindings/fmu/check.py couples it.

@@ -21,7 +21,7 @@ pub(crate) const BOARD: &str = "mps2-an386";
 pub(crate) enum Image {
     /// The product.
     SteeringEcu,
-    /// The same controller, driven tick by tick by a simulator.
+    /// The controller of the product, driven tick by tick by a simulator.
     Lockstep,
 }
 

@@ -2,12 +2,13 @@
 
 use anyhow::Result;
 
-use crate::tool::{Built, command, root, run};
+use crate::built::Built;
+use crate::tool::{command, root, run};
 use crate::venv;
 
 const SCENARIO: &str = "examples/relying-driver.toml";
 const DRIVE: &str = "tests/data/driver-logs/guided-passive.csv";
-/// Of a whole run: enough for every message, and seconds instead of minutes in Python.
+/// Rows of a whole run: enough for every message, and seconds instead of minutes in Python.
 const ROWS: usize = 4000;
 const FRAMES: usize = 40_000;
 

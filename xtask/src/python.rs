@@ -5,7 +5,8 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::tool::{Built, command, root, run};
+use crate::built::Built;
+use crate::tool::{command, root, run};
 use crate::venv::environment;
 use crate::wheel;
 

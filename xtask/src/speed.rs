@@ -41,7 +41,7 @@ struct Figures {
     /// (c) The lanes with every check over C, of one core, with the widest instructions of the machine.
     lanes_ratio: f64,
     lanes_x_real_time: f64,
-    /// The same with AVX2 at most, and with what every machine has.
+    /// The lanes with AVX2 at most, and with what every machine has, over C.
     lanes_avx2_ratio: f64,
     lanes_portable_ratio: f64,
     /// The whole of ours over the whole of C, whose ECU is the law and the bus's protection alone.

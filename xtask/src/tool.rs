@@ -6,8 +6,6 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
-use crate::dist;
-
 /// The workspace's root.
 pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -41,41 +39,6 @@ pub(crate) const SHAPE: [&str; 8] = [
 
 /// What the command line can read and write beyond what the first command builds.
 pub(crate) const ALL_FORMATS: &str = "host-sim/mcap";
-
-/// Which build of a binding is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Built {
-    /// With everything else, as [`SHAPE`] has it: in CI it is there already.
-    ForTests,
-    /// By itself, in the profile of the tests: as the README's first command builds it.
-    Daily,
-    /// By itself, in the profile `dist` and for an old glibc: what is handed on.
-    ToShip,
-}
-
-impl Built {
-    /// Builds a package for this computer; the directory of its libraries and programs.
-    pub(crate) fn package(self, name: &str) -> Result<PathBuf> {
-        let mut build = cargo();
-        build.args(["build", "-q"]);
-        match self {
-            // With the tests, whose dependencies switch on features of what the rest depends on too.
-            Self::ForTests => run(build.args(SHAPE).arg("--all-targets"))?,
-            Self::Daily => run(build.args(["--release", "-p", name]))?,
-            Self::ToShip => return dist::build(name, ""),
-        }
-        Ok(root().join("target/release"))
-    }
-
-    /// The command line to check others with: that of daily work, which computes the same bits as the one that is handed on.
-    pub(crate) fn host_sim(self) -> Result<PathBuf> {
-        let built = match self {
-            Self::ForTests => self,
-            Self::Daily | Self::ToShip => Self::Daily,
-        };
-        Ok(built.package("host-sim")?.join(HOST_SIM))
-    }
-}
 
 /// The command line's file.
 pub(crate) const HOST_SIM: &str = if cfg!(windows) { "host-sim.exe" } else { "host-sim" };

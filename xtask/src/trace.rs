@@ -12,8 +12,10 @@ use serde::Deserialize;
 
 use crate::tool;
 
+/// What a stage of `cargo xtask ci` says last of itself.
+pub(crate) const PROCESSOR_TIME: &str = "processor time: ";
+
 const LIST: &str = "docs/requirements.toml";
-const PAGE: &str = "docs/requirements.md";
 const CLASSES: [&str; 7] = ["A", "B", "C", "D", "L", "R", "design"];
 /// Commands of `cargo xtask` that show something, and the stage of `cargo xtask ci` that is each.
 const GATES: [(&str, &str); 5] = [
@@ -47,23 +49,19 @@ struct Requirement {
     evidence: Vec<String>,
 }
 
-/// Checks the list, and the page that is made of it; writes the page if `bless`.
-pub(crate) fn run(bless: bool) -> Result<()> {
-    let list: List = toml::from_str(&read(LIST)?).context(LIST)?;
+fn list() -> Result<List> {
+    toml::from_str(&read(LIST)?).context(LIST)
+}
+
+/// Checks the list.
+pub(crate) fn run() -> Result<()> {
+    let list = list()?;
     let items = items()?;
     let errors = check(&list.requirement, &items, &|path| read(path).ok());
     for error in &errors {
         eprintln!("{LIST}: {error}");
     }
     ensure!(errors.is_empty(), "{} errors in the requirements", errors.len());
-    let page = page(&list.requirement);
-    if bless {
-        fs::write(tool::root().join(PAGE), &page).context(PAGE)?;
-    }
-    ensure!(
-        read(PAGE).is_ok_and(|there| there == page),
-        "{PAGE} is not what {LIST} makes: cargo xtask trace --bless"
-    );
     let evidence: usize = list.requirement.iter().map(|r| r.evidence.len()).sum();
     println!(
         "{} requirements with {evidence} pieces of evidence cover {} limits, faults, rows, transitions and parameters",
@@ -76,7 +74,7 @@ pub(crate) fn run(bless: bool) -> Result<()> {
 /// Judges every requirement by what a run of `cargo xtask ci` left in its logs, and writes that as JUnit's XML beside
 /// them. A requirement is met if all its evidence ran and passed; evidence of `--full` alone that did not run is named.
 pub(crate) fn by_execution(logs: &Path) -> Result<()> {
-    let list: List = toml::from_str(&read(LIST)?).context(LIST)?;
+    let list = list()?;
     let log = |stage: &str| fs::read_to_string(logs.join(format!("{stage}.log"))).ok();
     let tests = log("tests").context("target/ci/tests.log: no run of cargo xtask ci")?;
     let tests = outcomes(&tests);
@@ -135,7 +133,7 @@ fn outcome(
             let (_, stage) = GATES.iter().find(|(gate, _)| *gate == name)?;
             // The last line of a stage that failed is its error.
             let last = log(stage)?.lines().last().map(str::to_owned)?;
-            Some(last.starts_with(crate::ci::PROCESSOR_TIME))
+            Some(last.starts_with(PROCESSOR_TIME))
         }
         Some(("test", place)) => Some(passed(place, tests)),
         _ => Some(CAMPAIGN.iter().all(|place| passed(place, tests))),
@@ -237,11 +235,12 @@ fn items() -> Result<BTreeSet<String>> {
             }
         }
     }
-    // Every table of the campaign has names in its first column.
-    let rows = campaign
-        .lines()
-        .filter_map(|line| line.strip_prefix("| `")?.split_once("` | "));
-    items.extend(rows.map(|(name, _)| format!("row {name}")));
+    // One entry of a list for each group of faults, with the names in backticks.
+    for group in campaign.split("\n- *").skip(1) {
+        let group = group.split("\n\n").next().unwrap_or("");
+        let names = group.split('`').skip(1).step_by(2);
+        items.extend(names.map(|name| format!("row {name}")));
+    }
     let parameters = read("docs/parameters.md")?;
     let rows = parameters
         .lines()
@@ -351,23 +350,19 @@ fn matches(pattern: &str, text: &str) -> bool {
     }
 }
 
-fn page(requirements: &[Requirement]) -> String {
+/// The list as a table of a page.
+pub(crate) fn page() -> Result<String> {
     let mut page = String::from(
-        "# Requirements\n\nMade of [requirements.toml](requirements.toml) by `cargo xtask trace --bless`; do not edit. `cargo \
-         xtask trace` fails on\nevidence that is not there, and on a limit, fault, row of the campaign, mode transition or \
-         parameter that no\nrequirement covers. `cargo xtask ci` fails where evidence did not run or did not pass, and leaves a \
-         verdict for each\nrequirement in `target/ci/requirements.xml` (JUnit); `cargo xtask trace --ran` judges the last run \
-         again.\n\n| identifier | requirement | class | source | covers | evidence \
-         |\n|---|---|---|---|---|---|\n",
+        "| identifier | requirement | class | source | covers | evidence |\n|---|---|---|---|---|---|\n",
     );
-    let list = |items: &[String]| {
+    let in_lines = |items: &[String]| {
         items
             .iter()
             .map(|item| format!("`{item}`"))
             .collect::<Vec<_>>()
             .join("<br>")
     };
-    for r in requirements {
+    for r in list()?.requirement {
         let _ = writeln!(
             page,
             "| {} | {} | {} | {} | {} | {} |",
@@ -375,11 +370,11 @@ fn page(requirements: &[Requirement]) -> String {
             r.text,
             r.class,
             r.source,
-            list(&r.covers),
-            list(&r.evidence)
+            in_lines(&r.covers),
+            in_lines(&r.evidence)
         );
     }
-    page
+    Ok(page)
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use std::process::Stdio;
 
 use anyhow::{Context, Result, bail};
 
-use crate::tool::{Built, cargo, command, ensure, exists, output, root, run};
+use crate::built::Built;
+use crate::tool::{cargo, command, ensure, exists, output, root, run};
 use crate::{dist, venv};
 
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";

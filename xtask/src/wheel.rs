@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
+use crate::built::Built;
 use crate::release::papers;
-use crate::tool::{ALL_FORMATS, Built, HOST_SIM, cargo, command, output, root, run};
+use crate::tool::{ALL_FORMATS, HOST_SIM, cargo, command, output, root, run};
 use crate::{dist, venv};
 
 /// What `cargo xtask wheel` is asked for.

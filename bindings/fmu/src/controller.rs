@@ -139,7 +139,7 @@ impl Model for Controller {
         Ok(())
     }
 
-    /// As on a vehicle: while nobody is guided, the ECU starts again with the new set.
+    /// Takes a new set while nobody is guided: the ECU starts again with it, like one on a vehicle.
     fn tune(&mut self, values: &[f64]) -> Result<(), FmuError> {
         let setup = setup_of(values)?;
         if !matches!(self.mode, Mode::Boot | Mode::Standby) {

@@ -11,7 +11,7 @@ const MOST_BYTES: usize = 1 << 27;
 pub(crate) const MOST_STEPS: u64 = 36_000_000;
 /// Bytes that copies share.
 const CHUNK: usize = 1 << 16;
-/// Of a value in a group: its reference and itself.
+/// Bytes of a value in a group: its reference and itself.
 const VALUE: usize = 9;
 
 /// Values that were given before a step, by their references.

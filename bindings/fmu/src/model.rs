@@ -50,6 +50,6 @@ pub trait Model: Send {
         Err(FmuError::NotTunable)
     }
 
-    /// The same again, for a state that is taken.
+    /// A copy of the model, for a state that is taken.
     fn copy(&self) -> Box<dyn Model>;
 }

@@ -42,7 +42,7 @@ pub(crate) fn interruptible<T: Send + 'static>(
     until(py, &NEVER, told, work)
 }
 
-/// The same until somebody stops it: Ctrl-C reaches the main thread of Python alone.
+/// Works until it is done or somebody stops it: Ctrl-C reaches the main thread of Python alone.
 pub(crate) fn until<T: Send + 'static>(
     py: Python<'_>,
     stopped: &AtomicBool,

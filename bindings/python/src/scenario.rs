@@ -46,7 +46,7 @@ use crate::errors;
 #[pyclass(frozen, module = "haptic_guidance")]
 pub(crate) struct Scenario {
     pub(crate) inner: haptic_sim::Scenario,
-    /// As given.
+    /// The fields that were given.
     fields: Table,
     /// Where a course file is looked for.
     folder: PathBuf,
@@ -173,7 +173,7 @@ impl Scenario {
         Self::make(py, &name, &text, fields, folder, refused)
     }
 
-    /// The same scenario with some fields changed; a table is changed field by field.
+    /// A scenario like this one with some fields changed; a table is changed field by field.
     ///
     /// Parameters
     /// ----------

@@ -64,14 +64,14 @@ impl Loop {
     }
 }
 
-/// Of many: what is seen, what is told beside it, means of the costs, how each ended.
+/// What a step of many loops gives: what is seen, what is told beside it, means of the costs, how each ended.
 type Stepped<'py> = (
     Bound<'py, PyArray2<f32>>,
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray1<u8>>,
 );
-/// The same of one.
+/// What a step of one loop gives, in that order.
 type SteppedOne<'py> = (Bound<'py, PyArray1<f32>>, Vec<f64>, [f64; COSTS], u8);
 
 impl Simulations {

@@ -157,26 +157,38 @@ impl Reject {
     }
 }
 
-/// What a receiver remembers of one sender, in two bytes, so that a second copy costs half a word.
+/// What a receiver remembers of one sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReceiverState {
-    /// Counter of the last frame, [`NONE`] before the first.
-    pub(crate) last: u8,
+    /// Counter of the last frame; `None` before the first.
+    last: Option<u8>,
     /// Clean frames in a row, up to [`CLEAN_FRAMES_TO_TRUST`].
-    pub(crate) clean: u8,
+    clean: u8,
 }
-
-/// The value of `last` before any counter was received.
-const NONE: u8 = 16;
 
 impl ReceiverState {
     /// A sender that has sent nothing yet.
-    pub const NEW: Self = Self { last: NONE, clean: 0 };
+    pub const NEW: Self = Self { last: None, clean: 0 };
     /// A sender that is trusted from its first frame on, for studies that start in mid-drive.
     pub const TRUSTED: Self = Self {
-        last: NONE,
+        last: None,
         clean: CLEAN_FRAMES_TO_TRUST,
     };
+
+    /// Two bytes for memory that is kept twice, which holds any bits: the counter, or more than its four bits before the first.
+    pub(crate) const fn bytes(self) -> [u8; 2] {
+        let last = match self.last {
+            Some(counter) => counter,
+            None => u8::MAX,
+        };
+        [last, self.clean]
+    }
+
+    /// The state of two such bytes.
+    pub(crate) fn of_bytes([last, clean]: [u8; 2]) -> Self {
+        let last = (last <= 0x0F).then_some(last);
+        Self { last, clean }
+    }
 
     /// Whether the next frame in order is used at once.
     #[must_use]
@@ -187,7 +199,7 @@ impl ReceiverState {
     /// The step from the last counter, modulo 16; `None` before the first.
     #[inline(always)]
     pub(crate) fn delta(&self, counter: u8) -> Option<u8> {
-        (self.last != NONE).then(|| counter.wrapping_sub(self.last) & 0x0F)
+        self.last.map(|last| counter.wrapping_sub(last) & 0x0F)
     }
 
     /// Checks a frame and stores its counter. `max_delta` is the largest step of the counter that lost frames within
@@ -205,7 +217,7 @@ impl ReceiverState {
             } else {
                 1
             };
-            self.last = counter;
+            self.last = Some(counter);
             return if self.is_trusted() {
                 Ok(())
             } else {
@@ -218,7 +230,7 @@ impl ReceiverState {
             // accepted.
             Some(delta) if delta > max_delta => Err(Reject::Jump),
             _ => {
-                self.last = counter;
+                self.last = Some(counter);
                 Ok(())
             }
         }

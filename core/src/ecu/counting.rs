@@ -1,8 +1,9 @@
 //! How fast a sender counts, and whether it is alone under its identifier.
 //!
 //! A counter of four bits comes round: whoever puts sixteen counts between two frames of the true sender has every frame
-//! of both accepted. So a count costs time. A sender may count as fast as the fastest that there is, or twice as fast as it
-//! did lately, and [`AT_ONCE`] counts more, as frames that waited come together. Between two frames of a sender that keeps its
+//! of both accepted. So a count costs time, from a token bucket: the clock fills it, each count takes its cost. A sender may count
+//! as fast as the fastest sender that there is, or twice as fast as it did lately; the bucket holds the cost of [`AT_ONCE`] counts,
+//! as frames that waited come together. Between two frames of a sender that keeps its
 //! period there is then no time for sixteen counts of another, up to three of its frames lost in a row.
 //!
 //! Two senders under one identifier contradict each other: what one sends, the other has counted already. After
@@ -19,8 +20,8 @@ use crate::safety::redundant::{Words, words};
 const AT_ONCE: u32 = 12;
 /// The time between counts is forgotten within 2^5 of them.
 const PACE_SHIFT: u32 = 5;
-/// So many frames that contradict another sender end the trust. A sender that restarts without a silence has up to 13, the
-/// column until its window is open.
+/// So many frames that contradict another sender end the trust. A sender that restarts without a silence makes up to 13: its
+/// counter is out of order until the window of counts that are accepted, which grows with the silence, has reached it.
 const CONTRADICTIONS: u8 = 16;
 /// A contradiction is outweighed by so many frames in order.
 const OUTWEIGHED_BY: u8 = 8;
@@ -76,7 +77,7 @@ words! {
     pub(super) struct Counting {
         /// When the last count came.
         heard: Instant,
-        /// The time up to here is spent on counts.
+        /// The time up to here is spent on counts: from here to now is what the bucket holds.
         spent: Instant,
         /// The mean time between two counts, lately.
         pace: Micros,
@@ -171,7 +172,7 @@ impl Counting {
         is_one_too_many
     }
 
-    /// Begins the frames in order anew where they are missing.
+    /// Where the sender is distrusted, the frames in order that end it are counted anew.
     fn disturb(&mut self) {
         if self.is_distrusted() {
             self.marks.distrust = UNDISTURBED;
@@ -189,7 +190,7 @@ fn words_of(frame: &Frame) -> [u32; 2] {
     [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
 }
 
-/// The time of the counts that may come at once.
+/// What the bucket holds at most: the cost of the counts that may come at once.
 fn at_once(per_count: Micros) -> Micros {
     Micros::from_us(per_count.us().saturating_mul(AT_ONCE))
 }

@@ -32,7 +32,8 @@ const UNDISTURBED: u32 = 100;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub(super) struct Slot<T> {
-    e2e: ReceiverState,
+    /// A [`ReceiverState`]'s.
+    e2e: [u8; 2],
     /// [`LOST`], [`HELD`] or [`NEW`], as an [`Input`].
     state: u8,
     /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason. Of speeds, how many
@@ -85,7 +86,8 @@ const NEW: u8 = 2;
 impl<T> Slot<T> {
     /// What is small, as a word.
     fn head(&self) -> u32 {
-        u32::from_ne_bytes([self.e2e.last, self.e2e.clean, self.state, self.doubt])
+        let [last, clean] = self.e2e;
+        u32::from_ne_bytes([last, clean, self.state, self.doubt])
     }
 }
 
@@ -93,7 +95,7 @@ impl<T: Words> Words for Slot<T> {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         let [last, clean, state, doubt] = change(self.head()).to_ne_bytes();
         Self {
-            e2e: ReceiverState { last, clean },
+            e2e: [last, clean],
             state,
             doubt,
             counting: self.counting.map_words(change),
@@ -121,7 +123,7 @@ impl<T: Words> Slot<T> {
 
     fn new(e2e: ReceiverState, value: T, now: Instant) -> Self {
         Self {
-            e2e,
+            e2e: e2e.bytes(),
             state: LOST,
             doubt: 0,
             counting: Counting::NEW,
@@ -139,12 +141,14 @@ impl<T: Words> Slot<T> {
         now: Instant,
         periods: &Periods,
     ) -> Result<M, Reject> {
-        let before = self.e2e;
-        let decoded = M::decode_within(&mut self.e2e, frame, max_delta);
+        let before = ReceiverState::of_bytes(self.e2e);
+        let mut after = before;
+        let decoded = M::decode_within(&mut after, frame, max_delta);
+        self.e2e = after.bytes();
         let is_counted = match decoded {
             Err(Reject::Length | Reject::Crc) => false,
             // The counter of a sender that is not trusted is not looked at then.
-            Err(Reject::Range) => self.e2e != before,
+            Err(Reject::Range) => after != before,
             _ => true,
         };
         if !is_counted {
@@ -155,13 +159,13 @@ impl<T: Words> Slot<T> {
             None => self.counting.begin(frame, now, periods),
             Some(ahead) if (1..=max_delta).contains(&ahead) => {
                 if !self.counting.go_on(ahead, frame, now, periods) {
-                    self.e2e = before;
+                    self.e2e = before.bytes();
                     return Err(Reject::TooFast);
                 }
             }
             Some(ahead) => {
                 if self.counting.is_contradicted(ahead, frame, now, periods) {
-                    (self.state, self.doubt, self.e2e) = (LOST, 0, ReceiverState::NEW);
+                    (self.state, self.doubt, self.e2e) = (LOST, 0, ReceiverState::NEW.bytes());
                 }
             }
         }
@@ -210,7 +214,7 @@ fn take<T: Words, U: From<T>>(guarded: &mut Redundant<Slot<T>>, now: Instant, se
         return;
     }
     if now.since(slot.at) > slot.timeout() {
-        guarded.amend(|slot| (slot.state, slot.e2e) = (LOST, ReceiverState::NEW));
+        guarded.amend(|slot| (slot.state, slot.e2e) = (LOST, ReceiverState::NEW.bytes()));
     } else if state == HELD {
         *seen = Input::Held(value.into());
     } else {

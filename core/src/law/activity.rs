@@ -13,6 +13,8 @@
 //! `T_9` is what (9) asks for, before any share of it is taken: the torque applied would fall with the share, and with it the power
 //! that the share is computed from. The share only takes away, so that every bound on (9) holds for it too.
 //!
+//! A sample of the column is felt in the step after it, with the `T_9` of the step in which it came.
+//!
 //! Its memory is not kept twice: whatever a flipped bit makes of it, the share is one from lambda_min to 1, and is right again
 //! when the low-passes have forgotten.
 //!
@@ -33,6 +35,17 @@ const NOBODY: u64 = 1 << (48 - 20);
 const AGREEMENT_PER_US: u32 = 8590;
 const SIZE_PER_US: u32 = 4295;
 
+/// A sample of the column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sample {
+    /// When it came.
+    pub at: Instant,
+    /// phi.
+    pub wheel: Radians,
+    /// The driver's torque, and what (9) asked for when the sample came.
+    pub torques: [Torque; 2],
+}
+
 /// What it remembers since guidance began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Activity {
@@ -46,6 +59,8 @@ pub struct Activity {
     size: i64,
     /// `min(1, max(0, -A/(B + b)))`.
     against: Ratio,
+    /// What came in the step before and is felt in this one.
+    pending: Option<Sample>,
 }
 
 impl Activity {
@@ -57,16 +72,25 @@ impl Activity {
         agreement: 0,
         size: 0,
         against: Ratio::ZERO,
+        pending: None,
     };
 
-    /// Takes a sample of the column that came at an instant, beside what (9) asks for then; `filter` has that of the rate.
-    pub fn update(
-        &mut self,
-        filter: &Coefficients,
-        at: Instant,
-        wheel: Radians,
-        [driver, asked]: [Torque; 2],
-    ) {
+    /// Takes what a step brings. A sample is felt in the step after it, because the step with its frame has work enough; where
+    /// every step brings one, every second sample is felt.
+    pub fn step(&mut self, filter: &Coefficients, new: Option<Sample>) {
+        match self.pending.take() {
+            Some(sample) => self.feel(filter, &sample),
+            None => self.pending = new,
+        }
+    }
+
+    /// Feels a sample; `filter` has the low-pass of the rate.
+    pub fn feel(&mut self, filter: &Coefficients, sample: &Sample) {
+        let Sample {
+            at,
+            wheel,
+            torques: [driver, asked],
+        } = *sample;
         let passed = at.since(self.at).min(GAP);
         self.rate = if passed == GAP {
             I12F20::ZERO
@@ -154,6 +178,32 @@ mod tests {
         }
     }
 
+    /// A sample of a wheel that turns at 1 rad/s is felt in the step after it; where there is one in every step, every second
+    /// is, over the time of both.
+    #[test]
+    fn a_sample_is_felt_in_the_step_after_it() {
+        let Some(law) = Config::PAPER.law() else {
+            panic!("the paper's law");
+        };
+        for sign in [1.0, -1.0] {
+            let mut activity = Activity::NEW;
+            let comes = [0, 1, 0, 0, 1, 1, 1, 1, 1, 0, 0];
+            // The instant of the sample felt last, ms.
+            let felt = [0, 0, 2, 2, 2, 5, 5, 7, 7, 9, 9];
+            for (ms, (comes, felt)) in (1_u32..).zip(comes.into_iter().zip(felt)) {
+                let sample = Sample {
+                    at: Instant::from_us(1000 * ms),
+                    wheel: Radians::from_rad(sign * 1e-3 * f64::from(ms)),
+                    torques: [Torque::from_nm(2.0), Torque::from_nm(-2.0)],
+                };
+                activity.step(law.coefficients(), (comes != 0).then_some(sample));
+                assert_eq!(activity.at, Instant::from_us(1000 * felt), "{ms}");
+                let turned = sign * 1e-3 * f64::from(felt);
+                assert!((activity.wheel.rad() - turned).abs() < 1e-6, "{ms}");
+            }
+        }
+    }
+
     /// The wheel goes on at 1 rad/s, but how fast it turned over a gap of 0.1 s or more nobody knows: then nothing is added to
     /// what was felt, and it is forgotten as where the wheel stands.
     #[test]
@@ -165,10 +215,12 @@ mod tests {
             for (gap_ms, adds) in [(10, true), (99, true), (100, false), (500, false)] {
                 let mut activity = Activity::NEW;
                 let mut feel = |ms: u32| {
-                    let wheel = Radians::from_rad(sign * 1e-3 * f64::from(ms));
-                    let torques = [Torque::from_nm(2.0), Torque::from_nm(-2.0)];
-                    let at = Instant::from_us(1_000_000 + 1000 * ms);
-                    activity.update(law.coefficients(), at, wheel, torques);
+                    let sample = Sample {
+                        at: Instant::from_us(1_000_000 + 1000 * ms),
+                        wheel: Radians::from_rad(sign * 1e-3 * f64::from(ms)),
+                        torques: [Torque::from_nm(2.0), Torque::from_nm(-2.0)],
+                    };
+                    activity.feel(law.coefficients(), &sample);
                     activity.size
                 };
                 let before = (0..=100).map(|step| feel(10 * step)).last();

@@ -42,7 +42,7 @@ fn times(a: I2F30, b: I2F30) -> I2F30 {
     I2F30::wrapping_from_num(a.wide_mul(b))
 }
 
-/// The same for a `b` below a half, which fits an I0F32: then the product is the upper half of one of 64 bits,
+/// `a*b` for a `b` below a half, which fits an I0F32: then the product is the upper half of one of 64 bits,
 /// which a 32-bit core has in one instruction.
 fn times_small(a: I2F30, b: I2F30) -> I2F30 {
     I2F30::wrapping_from_num(a.wide_mul(I0F32::wrapping_from_num(b)))

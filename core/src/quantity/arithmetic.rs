@@ -7,7 +7,7 @@ use fixed::{FixedI32, FixedI64};
 
 use super::Micros;
 
-/// With fewer fractional bits, rounded to nearest (ties away from minus infinity). Half a unit of the result more than
+/// A value with fewer fractional bits, rounded to nearest (ties away from minus infinity). Half a unit of the result more than
 /// `wide` fits its format too.
 pub(crate) const fn rounded<From: LeEqU64, To: LeEqU64>(wide: FixedI64<From>) -> FixedI64<To> {
     let cut = From::U32.wrapping_sub(To::U32);
@@ -42,7 +42,7 @@ pub(crate) fn product_below(a: I8F24, b: I8F24) -> I8F24 {
     saturate(I40F24::wrapping_from_num(a.wide_mul(b)))
 }
 
-/// The same, held within +-`most`.
+/// A product rounded down and held within +-`most`.
 pub(crate) fn product_within(a: I8F24, b: I8F24, most: I8F24) -> I8F24 {
     let (wide, most) = (I40F24::wrapping_from_num(a.wide_mul(b)), I40F24::from(most));
     I8F24::wrapping_from_num(wide.min(most).max(most.wrapping_neg()))
@@ -81,7 +81,7 @@ fn wide_per_second(bits: i64, span: Micros) -> I8F24 {
     saturate(I40F24::from_bits(high.wrapping_add(low as i64)))
 }
 
-/// The same of 32 bits in any format, which never saturates: at most half of them is left.
+/// `value * span / 1 s`, rounded to nearest, of 32 bits in any format. It never saturates: at most half of the value is left.
 pub(crate) const fn per_second<Frac>(value: FixedI32<Frac>, span: Micros) -> FixedI32<Frac> {
     let wide = I8F24::from_bits(value.to_bits()).wide_mul(share_of_second(span));
     let near: I40F24 = rounded(wide);
@@ -185,7 +185,7 @@ mod tests {
 
     const CASES: u32 = 1_000_000;
 
-    /// As many bits of 2^-24.
+    /// A value of so many 2^-24.
     fn narrow(bits: i32) -> I8F24 {
         I8F24::from_bits(bits)
     }

@@ -58,7 +58,7 @@ macro_rules! quantity {
                 self.bits() as f64 / ONE as f64
             }
 
-            /// As f32, rounded to nearest: for what is advisory only.
+            /// The value in f32, rounded to nearest: for what is advisory only.
             #[must_use]
             pub const fn to_f32(self) -> f32 {
                 self.bits() as f32 * (1.0 / ONE as f32)
@@ -99,7 +99,7 @@ macro_rules! quantity {
                 Self(self.0.saturating_sub(other.0))
             }
 
-            /// As much the other way. The least value saturates.
+            /// The value with the other sign. The least one saturates.
             #[must_use]
             pub const fn opposite(self) -> Self {
                 // One instruction of a Cortex-M4; `saturating_neg` has five.

@@ -49,12 +49,32 @@ pub const AWAY_PER_US: Torque = Torque::from_bits(16);
 /// The lane is extrapolated once in this time.
 pub const EXTRAPOLATION_PERIOD: Micros = Micros::from_ms(10);
 
-/// Pictures come and agree.
-const SEES: u32 = 0;
-/// No picture comes.
-const BLIND: u32 = 1;
-/// Pictures come, of a line elsewhere.
-const APART: u32 = 2;
+/// What the camera sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sight {
+    /// Pictures come and agree.
+    Sees = 0,
+    /// No picture comes.
+    Blind = 1,
+    /// Pictures come, of a line elsewhere.
+    Apart = 2,
+}
+
+impl Sight {
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+    const fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// No code but that of a variant is ever stored; the copies have been compared.
+    const fn of_code(code: u32) -> Self {
+        match code {
+            0 => Self::Sees,
+            2 => Self::Apart,
+            _ => Self::Blind,
+        }
+    }
+}
 
 words! {
     /// What is remembered while pictures are missing.
@@ -65,8 +85,20 @@ words! {
         /// Time since the last picture that agreed, and the law's torque at that time.
         lost: Micros,
         demanded: Torque,
-        sight: u32,
+        /// A [`Sight`]'s code: memory that is kept twice holds words.
+        sight_code: u32,
     }
+}
+
+/// How a new picture compares with the line that was followed and with the vehicle's way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Compared {
+    /// Its line is where the one that was followed was extrapolated to.
+    Agrees,
+    /// It shows another line, which has moved as the vehicle does.
+    OtherLineFollows,
+    /// It shows another line, of which nobody knows that.
+    OtherLine,
 }
 
 /// What a new picture shows.
@@ -89,34 +121,43 @@ impl Coast {
         blind: Micros::from_us(0),
         lost: Micros::from_us(0),
         demanded: Torque::ZERO,
-        sight: SEES,
+        sight_code: Sight::Sees.code(),
     };
+
+    const fn sight(&self) -> Sight {
+        Sight::of_code(self.sight_code)
+    }
 
     /// Whether pictures come and agree, trust is complete, and no earlier gap counts any more.
     #[inline(always)]
     pub(crate) fn is_idle(&self) -> bool {
-        self.sight == SEES && self.trust == Ratio::ONE && self.blind.us() == 0
+        self.sight() == Sight::Sees && self.trust == Ratio::ONE && self.blind.us() == 0
     }
 
     /// Whether the extrapolated lane is used in place of pictures.
     pub(crate) const fn is_extrapolating(&self) -> bool {
         let is_short = self.lost.us() <= MOST_APART.us();
-        is_short && (self.sees_other_line() || (self.sight == BLIND && self.blind.us() <= MOST_BLIND.us()))
+        is_short
+            && match self.sight() {
+                Sight::Sees => false,
+                Sight::Blind => self.blind.us() <= MOST_BLIND.us(),
+                Sight::Apart => true,
+            }
     }
 
     /// Whether pictures show a line elsewhere.
     pub(crate) const fn sees_other_line(&self) -> bool {
-        self.sight == APART
+        matches!(self.sight(), Sight::Apart)
     }
 
     /// Whether no picture has come for so long that the driver has to know.
     pub(crate) fn is_long_blind(&self) -> bool {
-        self.sight == BLIND && self.lost >= WARN_BLIND
+        self.sight() == Sight::Blind && self.lost >= WARN_BLIND
     }
 
     /// The law's torque for the extrapolated lane, limited by [`AWAY_PER_US`].
     pub(crate) fn limited(&self, demanded: Torque) -> Torque {
-        if self.sight == SEES {
+        if self.sight() == Sight::Sees {
             return demanded;
         }
         let lost_us = self.lost.min(MOST_BLIND).us().cast_signed();
@@ -128,26 +169,30 @@ impl Coast {
 
     /// Notes that no picture is usable; `demanded` is the law's torque in this step.
     pub(crate) fn picture_missing(&mut self, demanded: Torque) {
-        self.demanded = if self.sight == SEES {
+        self.demanded = if self.sight() == Sight::Sees {
             demanded
         } else {
             self.demanded
         };
-        self.sight = BLIND;
+        self.sight_code = Sight::Blind.code();
     }
 
-    /// Takes a new picture; `agrees` says whether it fits the extrapolated lane, `follows` whether a line elsewhere has
-    /// moved as the vehicle does. An extrapolation over more than
-    /// [`MOST_BLIND`] is no evidence: an error of 3 mrad/s in the yaw rate moves it by half a metre in 3 s.
+    /// Whether a picture may agree with the extrapolated line. Over more than [`MOST_BLIND`] the extrapolation is no evidence: an
+    /// error of 3 mrad/s in the yaw rate moves it by half a metre in 3 s.
+    pub(crate) fn may_agree(&self) -> bool {
+        self.lost <= MOST_BLIND
+    }
+
+    /// Takes a new picture.
     pub(crate) fn picture_arrived(
         &mut self,
         sample: &LaneSample,
-        [agrees, follows]: [bool; 2],
+        compared: Compared,
         demanded: Torque,
     ) -> PictureVerdict {
-        if agrees && self.lost <= MOST_BLIND {
-            let is_first = self.sight != SEES;
-            self.sight = SEES;
+        if compared == Compared::Agrees {
+            let is_first = self.sight() != Sight::Sees;
+            self.sight_code = Sight::Sees.code();
             return if is_first {
                 PictureVerdict::Returned
             } else {
@@ -155,7 +200,7 @@ impl Coast {
             };
         }
         let is_near = sample.e_y.abs() <= NEAR && sample.e_theta.abs() <= ALONG;
-        if self.trust == Ratio::ZERO && is_near && follows {
+        if self.trust == Ratio::ZERO && is_near && compared == Compared::OtherLineFollows {
             *self = Self {
                 trust: Ratio::ZERO,
                 ..Self::NEW
@@ -163,17 +208,17 @@ impl Coast {
             return PictureVerdict::Adopted;
         }
         self.picture_missing(demanded);
-        self.sight = APART;
+        self.sight_code = Sight::Apart.code();
         PictureVerdict::Elsewhere
     }
 
     /// Advances the times and the trust by `elapsed`.
     pub(crate) fn advance(&mut self, elapsed: Micros, is_line_doubted: bool) {
         let (us, blind, lost) = (elapsed.us(), self.blind.us(), self.lost.us());
-        let (per_s, blind, lost) = match self.sight {
-            SEES => (RISE, blind.saturating_sub(us >> 1), 0),
-            APART => (APART_FALL, blind, lost.saturating_add(us)),
-            _ => (BLIND_FALL, blind.saturating_add(us), lost.saturating_add(us)),
+        let (per_s, blind, lost) = match self.sight() {
+            Sight::Sees => (RISE, blind.saturating_sub(us >> 1), 0),
+            Sight::Apart => (APART_FALL, blind, lost.saturating_add(us)),
+            Sight::Blind => (BLIND_FALL, blind.saturating_add(us), lost.saturating_add(us)),
         };
         (self.blind, self.lost) = (Micros::from_us(blind), Micros::from_us(lost));
         let change = Ratio::from_fixed(per_second(per_s.fixed(), elapsed));
@@ -192,7 +237,7 @@ mod tests {
         for (lost_ms, most_nm) in [(500, 0.4768), (1000, 0.9537), (1300, 0.9537), (4000, 0.9537)] {
             for sign in [1.0, -1.0] {
                 let coast = Coast {
-                    sight: APART,
+                    sight_code: Sight::Apart.code(),
                     lost: Micros::from_ms(lost_ms),
                     demanded: Torque::from_nm(0.2 * sign),
                     ..Coast::NEW
@@ -212,20 +257,24 @@ mod tests {
     /// An extrapolation of a second is the longest that a picture may agree with, whatever pictures came meanwhile.
     #[test]
     fn a_line_that_went_on_for_a_second_is_evidence_and_for_longer_is_none() {
-        for sight in [BLIND, APART] {
-            for (lost_us, verdict) in [
-                (999_999, PictureVerdict::Returned),
-                (1_000_000, PictureVerdict::Returned),
-                (1_000_001, PictureVerdict::Elsewhere),
-            ] {
+        for sight in [Sight::Blind, Sight::Apart] {
+            for (lost_us, may_agree) in [(999_999, true), (1_000_000, true), (1_000_001, false)] {
                 let mut coast = Coast {
-                    sight,
+                    sight_code: sight.code(),
                     lost: Micros::from_us(lost_us),
                     ..Coast::NEW
                 };
-                let sample = LaneSample::default();
-                let arrived = coast.picture_arrived(&sample, [true, true], Torque::ZERO);
-                assert_eq!(arrived, verdict, "{lost_us}");
+                assert_eq!(coast.may_agree(), may_agree, "{lost_us}");
+                // Trust is whole, so that another line is not adopted, however it moves.
+                for (compared, verdict) in [
+                    (Compared::OtherLine, PictureVerdict::Elsewhere),
+                    (Compared::OtherLineFollows, PictureVerdict::Elsewhere),
+                    (Compared::Agrees, PictureVerdict::Returned),
+                    (Compared::Agrees, PictureVerdict::Expected),
+                ] {
+                    let arrived = coast.picture_arrived(&LaneSample::default(), compared, Torque::ZERO);
+                    assert_eq!(arrived, verdict, "{lost_us} {compared:?}");
+                }
             }
         }
     }

@@ -160,7 +160,7 @@ impl<T: Words> Redundant<T> {
         self.value.agreement(&self.inverted) == u32::MAX
     }
 
-    /// The same in a function that is never inlined, as [`are_intact`].
+    /// Whether the copies agree, in a function that is never inlined, as [`are_intact`].
     #[inline(always)]
     pub(crate) fn agrees_apart(&self) -> bool {
         let guarded = self;

@@ -13,6 +13,8 @@
 //! Nothing here touches the running controller: a set takes effect when the ECU starts with it. Not here: the memory.
 //! Not in the torque path: checking a set is floating-point work.
 
+use core::num::NonZeroU32;
+
 use crate::bus::Frame;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
@@ -25,8 +27,6 @@ use crate::safety::modes::Mode;
 use crate::service::stored::{Set, Stored};
 
 const VALUES: usize = PARAMETERS.len();
-/// No field has this index.
-const REFUSED: usize = usize::MAX;
 /// An unlock lasts for so long, ms.
 pub const UNLOCK_MS: u32 = 2000;
 /// Two unlocks that come closer, ms, are of two senders, and unlock nothing.
@@ -44,8 +44,8 @@ pub struct Conditions {
     pub stands: bool,
     /// The last start was a power-up, or is ten seconds ago.
     pub settled: bool,
-    /// The number of the stored set in use; 0 without one.
-    pub in_use: u32,
+    /// The number of the stored set in use.
+    pub in_use: Option<u32>,
     /// Time since the start, ms, which may wrap.
     pub now_ms: u32,
 }
@@ -61,7 +61,8 @@ pub fn mode_for_parameters(mode: Mode, faults: FaultSet) -> Mode {
     }
 }
 
-/// The frame that has to come before those of a set for the vehicle of that number.
+/// The frame that has to come before those of a set for the vehicle of that number, by the numbers that the bus carries: that of
+/// the set in use as [`ParameterStatus`] says it.
 #[must_use]
 pub fn unlock(in_use: u32, vehicle: u32) -> Frame {
     let unlock = ParameterUnlock {
@@ -102,15 +103,23 @@ pub fn frames(params: &Params) -> [Frame; VALUES] {
     })
 }
 
+/// The field that may come next, beside the first, which may always begin a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Due {
+    /// That of this index.
+    Field(usize),
+    /// None: the set was refused.
+    Nothing,
+}
+
 /// A set that is being received.
 #[derive(Debug, Clone)]
 pub struct Download {
     values: [f64; VALUES],
-    /// The field that must come next.
-    next: usize,
+    due: Due,
     /// When it was unlocked, and for a set for which vehicle.
     unlocked_ms: Option<u32>,
-    vehicle: u32,
+    vehicle: Option<NonZeroU32>,
     /// When the last unlock came, and the first field of this set.
     asked_ms: Option<u32>,
     began_ms: u32,
@@ -121,9 +130,9 @@ impl Download {
     /// Before the first frame.
     pub const NEW: Self = Self {
         values: [0.0; VALUES],
-        next: 0,
+        due: Due::Field(0),
         unlocked_ms: None,
-        vehicle: 0,
+        vehicle: None,
         asked_ms: None,
         began_ms: 0,
         outcome: WriteOutcome::None,
@@ -136,11 +145,12 @@ impl Download {
         match frame.id() {
             ParameterUnlock::ID => {
                 let unlock = ParameterUnlock::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
-                let is_right = unlock.sequence == conditions.in_use;
+                // The bus says 0 where there is none.
+                let is_right = unlock.sequence == conditions.in_use.unwrap_or(0);
                 let before = self.asked_ms.replace(conditions.now_ms);
                 let is_alone = before.is_none_or(|at| since_ms(at) >= UNLOCK_APART_MS);
                 self.unlocked_ms = (is_right && is_alone).then_some(conditions.now_ms);
-                self.vehicle = unlock.vehicle;
+                self.vehicle = NonZeroU32::new(unlock.vehicle);
                 return None;
             }
             ParameterWrite::ID => {}
@@ -150,12 +160,15 @@ impl Download {
         let write = ParameterWrite::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
         let index = usize::from(write.index);
         if index == 0 {
-            (self.next, self.began_ms) = (0, conditions.now_ms);
-        } else if self.next == REFUSED {
+            (self.due, self.began_ms) = (Due::Field(0), conditions.now_ms);
+        } else if self.due == Due::Nothing {
             // The rest of a refused set keeps the reason.
             return None;
         }
-        let slot = self.values.get_mut(index).filter(|_| index == self.next);
+        let slot = self
+            .values
+            .get_mut(index)
+            .filter(|_| self.due == Due::Field(index));
         let is_unlocked = self.unlocked_ms.is_some_and(|at| since_ms(at) <= UNLOCK_MS);
         let most = (since_ms(self.began_ms) / FIELD_MS).saturating_add(FIELDS_AT_ONCE);
         self.outcome = match slot {
@@ -174,12 +187,11 @@ impl Download {
             // For one attempt.
             self.unlocked_ms = None;
         }
-        self.next = match self.outcome {
-            WriteOutcome::Receiving => index.saturating_add(1),
-            // Only the first field begins a set.
-            _ => REFUSED,
+        self.due = match self.outcome {
+            WriteOutcome::Receiving => Due::Field(index.saturating_add(1)),
+            _ => Due::Nothing,
         };
-        if self.next < VALUES || self.outcome != WriteOutcome::Receiving {
+        if self.due != Due::Field(VALUES) {
             return None;
         }
         let params = Params::from_values(&self.values);

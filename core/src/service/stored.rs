@@ -14,6 +14,8 @@
 //! without a good copy (`Ecu::new` locks). Absurd values within their ranges are accepted: the envelope bounds
 //! what they can do.
 
+use core::num::NonZeroU32;
+
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use crate::controller::config::Setup;
@@ -31,8 +33,8 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 pub struct Set {
     /// The parameters.
     pub params: Params,
-    /// The number of the vehicle; 0: nobody said.
-    pub vehicle: u32,
+    /// The number of the vehicle, if anybody said it.
+    pub vehicle: Option<NonZeroU32>,
 }
 
 /// What [`load`] found.
@@ -50,7 +52,8 @@ pub struct Stored {
 #[must_use]
 pub fn save(set: &Set, sequence: u32, hardware: u32) -> [u8; BYTES] {
     let mut bytes = [0; BYTES];
-    let head = [VERSION, sequence, hardware, set.vehicle]
+    let vehicle = set.vehicle.map_or(0, NonZeroU32::get);
+    let head = [VERSION, sequence, hardware, vehicle]
         .into_iter()
         .flat_map(u32::to_le_bytes);
     let values = set.params.to_values().into_iter().flat_map(f64::to_le_bytes);
@@ -91,6 +94,6 @@ fn read(bytes: &[u8], hardware: u32) -> Option<(u32, Set)> {
     for (si, bytes) in si.iter_mut().zip(values.as_chunks().0) {
         *si = f64::from_le_bytes(*bytes);
     }
-    let params = Params::from_values(&si);
+    let (params, vehicle) = (Params::from_values(&si), NonZeroU32::new(vehicle));
     (is_whole && is_ours && Setup::check(&params).is_ok()).then_some((sequence, Set { params, vehicle }))
 }

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 pub(crate) struct MotionHistory {
     headings: VecDeque<Heading>,
     lines: VecDeque<(i64, f64)>,
-    /// Of another line that pictures show.
+    /// Directions of another line that pictures show.
     others: VecDeque<(i64, f64)>,
 }
 

@@ -47,7 +47,7 @@ fn near(value: f64) -> f64 {
     (value / LSB).round() * LSB
 }
 
-/// The same, down.
+/// A value rounded down to the core's resolution.
 fn down(value: f64) -> f64 {
     (value / LSB).floor() * LSB
 }
@@ -103,6 +103,8 @@ struct Activity {
     rate: f64,
     agreement: f64,
     size: f64,
+    /// What came in the step before: its instant, and what (9) asked for then.
+    pending: Option<(i64, receivers::Column, f64)>,
 }
 
 #[derive(Debug, Clone, Copy)]

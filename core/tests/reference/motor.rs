@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 #[derive(Debug, Clone)]
 pub(crate) struct MotorCheck {
-    /// Of the last 8 ms, newest first.
+    /// Torques that were commanded in the last 8 ms, newest first.
     commands: VecDeque<f64>,
     low: f64,
     high: f64,

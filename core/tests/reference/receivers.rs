@@ -112,7 +112,7 @@ struct Sender<T> {
     is_new: bool,
     at: i64,
     period_us: i64,
-    /// Of lanes: the last was not valid (1), or a step (2); of speeds: how many stepped in a row.
+    /// What is not well: the last lane was not valid (1), or a step (2); or how many speeds stepped in a row.
     doubt: i64,
 }
 

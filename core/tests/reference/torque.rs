@@ -169,11 +169,11 @@ impl Reference {
             return 1.0;
         }
         let activity = &mut self.activity;
-        if let Input::New(column) = seen.column {
+        if let Some((at, column, asked)) = activity.pending.take() {
             let tau = 1.0 / (std::f64::consts::TAU * p.rate_corner_hz);
             let passed = activity
                 .last
-                .map_or(0.1, |(_, at)| (now - at) as f64 * 1e-6)
+                .map_or(0.1, |(_, last)| (at - last) as f64 * 1e-6)
                 .min(0.1);
             activity.rate = match activity.last {
                 Some((last, _)) if passed < 0.1 => {
@@ -181,11 +181,13 @@ impl Reference {
                 }
                 _ => 0.0,
             };
-            activity.last = Some((column.wheel, now));
+            activity.last = Some((column.wheel, at));
             let power = column.driver * asked * activity.rate.powi(2).min(64.0);
             activity.size += passed * (power.abs() - activity.size);
             let agreement = activity.agreement + passed / 0.5 * (power - activity.agreement);
             activity.agreement = agreement.clamp(-activity.size, activity.size);
+        } else if let Input::New(column) = seen.column {
+            activity.pending = Some((now, column, asked));
         }
         let against = (-activity.agreement / (activity.size + 0.5_f64.powi(20))).max(0.0);
         1.0 - (1.0 - p.activity_lambda_min) * against

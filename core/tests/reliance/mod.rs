@@ -43,7 +43,7 @@ pub(crate) fn block_us(params: &Params) -> f64 {
 /// The readings since hands were last on the wheel, averaged.
 struct Readings {
     all: Vec<f64>,
-    /// Of them, those since the last change.
+    /// How many of them came since the last change.
     since_change: usize,
     /// Squared innovations, one for each reading but the first.
     squares: Vec<f64>,

@@ -66,7 +66,7 @@ impl Watch {
         }
     }
 
-    /// Of a bench that is guiding already.
+    /// Watches a bench that is guiding already.
     pub(crate) fn engaged(rig: &Rig) -> Self {
         Self {
             torque: rig.applied,

@@ -122,14 +122,14 @@ const _: () = assert!(
 /// In what state an ECU starts up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StartState {
-    /// As a product does, with good parameters.
+    /// The start of a product with good parameters.
     Boot(Boot),
-    /// As a product whose parameters are damaged.
+    /// The start of a product whose parameters are damaged.
     WithoutParameters(Boot),
     /// Guiding, with every sender trusted, as in the paper's studies.
     Engaged,
-    /// As a product at power-up, with good parameters; the image also says what a product says of its parameters, of itself
-    /// and of frames that it did not use, and takes a set of parameters over the bus.
+    /// The whole of a product at power-up, with good parameters: the image also says what a product says of its
+    /// parameters, of itself and of frames that it did not use, and takes a set of parameters over the bus.
     Product,
 }
 
@@ -184,7 +184,7 @@ impl Start {
         Ok(self.ecu_with(&Setup::new(params)?))
     }
 
-    /// The same with parameters that are checked already.
+    /// An ECU in this state, with parameters that are checked already.
     #[must_use]
     pub fn ecu_with(self, setup: &Setup) -> Ecu {
         match self.state {

@@ -145,20 +145,7 @@ fn the_lock_step_client_of_the_page_ticks() {
     assert!(said.contains("1,000 ticks") && said.contains("0xc0"), "{said}");
 }
 
-/// The program is on the page as a whole: a reader who has only the page has it.
-#[test]
-fn the_page_shows_the_programs_as_they_are() {
-    let page = std::fs::read_to_string(root().join("docs/talk-to-the-ecu.md")).unwrap();
-    for program in ["talk_to_the_ecu.py", "lockstep_client.py"] {
-        let text = std::fs::read_to_string(root().join("examples").join(program)).unwrap();
-        assert!(
-            page.contains(&format!("```python file=examples/{program}\n{text}```")),
-            "{program} differs from the page"
-        );
-    }
-}
-
-/// As on the page: `cargo xtask qemu lockstep` in one shell, the program in the other.
+/// `cargo xtask qemu lockstep` runs in one shell and the program in the other, as the page says.
 #[test]
 fn the_program_of_the_page_drives_the_image_in_qemu() {
     let port = TcpListener::bind("127.0.0.1:0")

@@ -51,7 +51,7 @@ mod target {
         };
         Set {
             params,
-            vehicle: number,
+            vehicle: core::num::NonZeroU32::new(number),
         }
     }
 

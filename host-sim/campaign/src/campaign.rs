@@ -101,7 +101,8 @@ pub struct CaseResult {
     pub deviation_95_m: f64,
     /// Largest deviation from the fault-free run, m.
     pub deviation_m: f64,
-    /// The same had the torque been dropped in the step in which the ECU left; of the runs in which it left.
+    /// Largest deviation had the torque been dropped in the step in which the ECU left, m; of the runs in which it
+    /// left.
     pub dropped_m: Option<f64>,
     /// Most that a run went further than that, m.
     pub excess_m: Option<f64>,

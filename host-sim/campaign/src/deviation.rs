@@ -9,10 +9,6 @@ use super::drivers::{LANE_EDGE_M, OFF_ROAD_M};
 use super::ecu_harness::EcuHarness;
 use super::table::Class;
 
-/// A run ends so long after the onset, ms.
-pub(super) const AFTER_MS: u32 = 5200;
-/// The same where a lie takes its time, ms.
-pub(super) const LONG_AFTER_MS: u32 = 9000;
 /// A driver who is warned drives as manually so much later, ms.
 const NOTICES_MS: u32 = 1000;
 /// Most that a handover may move the vehicle beyond what dropping the torque in the same step does, m.
@@ -23,7 +19,7 @@ pub(crate) const MOST_EXCESS_M: f64 = 0.1;
 pub struct Deviation {
     /// Largest deviation, m.
     pub faulted_m: f64,
-    /// The same had the torque been dropped in the step in which the ECU left; `None` if it stayed.
+    /// Largest deviation had the torque been dropped in the step in which the ECU left, m; `None` if it stayed.
     pub dropped_m: Option<f64>,
     /// Largest distance from the vehicle whose torque is cut at the onset, m: the effect of the torque after the onset. For class C only.
     pub pushed_m: Option<f64>,

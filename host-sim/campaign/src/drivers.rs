@@ -28,9 +28,10 @@ const REMNANT_SD_NM: f64 = 0.4;
 pub enum Drivers {
     /// The participants of tables 5 and 6 and the nine drivers of tables 7 and 8, for the paper's car.
     Paper,
-    /// Those of `host-sim availability`, for a real one.
+    /// The drivers of `host-sim availability`, for a real car.
     Population,
-    /// The same with a reliance of 0.8 to 1 and without a remnant: nothing they do shows that the guidance is wrong.
+    /// The population with a reliance of 0.8 to 1 and without a remnant: nothing they do shows that the guidance is
+    /// wrong.
     Relying,
 }
 
@@ -117,7 +118,7 @@ pub fn lane_keeper(seed: u64) -> LaneKeeper {
     LaneKeeper::draw(&mut rng, REMNANT_SD_NM)
 }
 
-/// The same driver, relying on the guidance.
+/// The driver of a seed, relying on the guidance.
 pub fn relying(seed: u64) -> LaneKeeper {
     let driver = lane_keeper(seed);
     LaneKeeper {

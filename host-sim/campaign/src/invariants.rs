@@ -34,7 +34,7 @@ use frame::{override_bounds, warned, well_formed};
 const LIMIT_NM: f64 = 5.0;
 const WIND_UP_NM_PER_S: f64 = 4.0;
 const REDUCTION_NM_PER_S: f64 = 8.0;
-/// The same in a handover from an implausible lane.
+/// The reduction in a handover from an implausible lane.
 const LIE_NM_PER_S: f64 = 32.0;
 const WINDOW_NM: f64 = 1.2;
 const WINDOW_US: u64 = 250_000;

@@ -68,7 +68,7 @@ const PUSHED_NM: f64 = 0.3;
 const STILL_S: f64 = 1.0;
 /// The turn of the wheel is measured anew when the torque changes, and after this time, s.
 const STILL_WITHIN_S: f64 = 2.0;
-/// With the probe, and without it, rad.
+/// How far the wheel has to turn, beside the probe and without it, rad.
 const STILL_TURN_RAD: [f64; 2] = [0.0087, 0.14];
 /// Inertia of column and wheel.
 const INERTIA_KG_M2: f64 = 0.125;
@@ -134,7 +134,7 @@ pub(super) struct Residual {
     headings: VecDeque<[f64; 3]>,
     /// When, and the line's direction at the far point in the frame of the headings.
     lines: VecDeque<[f64; 2]>,
-    /// The same of a line elsewhere, with its last sample.
+    /// When, and the direction of a line elsewhere; below it that line's last sample.
     other_lines: VecDeque<[f64; 2]>,
     other: Option<(f64, f64, f64)>,
     /// A line was adopted and has shown no movement yet; the way by which the vehicle turned its near point.

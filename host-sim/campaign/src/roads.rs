@@ -155,7 +155,7 @@ impl ChangingRoad {
         .course()
     }
 
-    /// With a place for an onset.
+    /// A road of this world with a place for an onset.
     pub(super) fn curve(&self, place: PlaceOnRoad, onset_ms: u32) -> Course {
         self.course(onset_ms, lengths_s(place), self.curvature_1pm(LATERAL_M_PER_S2))
     }

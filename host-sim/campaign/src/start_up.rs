@@ -57,7 +57,10 @@ fn absurd() -> Params {
 
 /// Whether a boot finds the set in use before in the memory of the parameters.
 fn finds_previous(start: Start, rng: &mut Xoshiro256PlusPlus) -> bool {
-    let set = |params| Set { params, vehicle: 0 };
+    let set = |params| Set {
+        params,
+        vehicle: None,
+    };
     let previous = set(Params::PAPER);
     let other = set(Params {
         torque_limit_nm: 3.0,

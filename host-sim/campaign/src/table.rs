@@ -15,10 +15,14 @@ use haptic_sim::models::nonlinear::WorldParameters;
 use serde::Serialize;
 
 use super::bytes::{FAULT, HANDOVER};
-use super::deviation::AFTER_MS;
 use super::drivers::Limits;
 use super::injection::{Hand, Injection, Motor, Start};
 use super::residual::Detectability;
+
+/// A run ends so long after the onset, ms.
+pub(super) const AFTER_MS: u32 = 5200;
+/// A run with a lie that takes its time ends so long after the onset, ms.
+pub(super) const LONG_AFTER_MS: u32 = 9000;
 
 /// Rows, one line each: name, what is injected, the injections, and what is other than in a row that goes on ([`build`]).
 macro_rules! rows {
@@ -155,7 +159,7 @@ pub struct FaultCase {
 }
 
 impl FaultCase {
-    /// The same in a curve, where what is wrong with an input has to show.
+    /// This row in a curve, where what is wrong with an input has to show.
     #[must_use]
     pub fn in_a_curve(&self) -> Self {
         Self {
@@ -236,7 +240,8 @@ const CONTRADICTION_MS: u32 = 200;
 /// From the instant in which the motor delivers what no honest one would, if it goes on: 10 ms of patience, two
 /// periods of the column, and the cycle in which it is seen.
 const MOTOR_MS: u32 = 15;
-/// The same where torque is missing: 50 ms of patience, two periods of the column, and the cycle in which it is seen.
+/// From the instant in which torque is missing: 50 ms of patience, two periods of the column, and the cycle in which it
+/// is seen.
 pub(super) const WEAK_MS: u32 = 55;
 /// Torque in ordinary curves and through a jerk of the wheel. Measured peaks are below it; the point is that
 /// no fault may draw more.

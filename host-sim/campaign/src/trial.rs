@@ -18,14 +18,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use super::deviation::{Deviation, LONG_AFTER_MS, drive};
+use super::deviation::{Deviation, drive};
 use super::drivers::{Driver, Drivers, everyone, lane_keeper, relying};
 use super::ecu_harness::EcuHarness;
 use super::injection::Start;
 use super::invariants::Violation;
 use super::roads::{self, ChangingRoad, TURN_KMH};
 use super::speed_change::SpeedChange;
-use super::table::{FaultCase, PlaceOnRoad};
+use super::table::{FaultCase, LONG_AFTER_MS, PlaceOnRoad};
 use super::trial_record::EcuTrace;
 use super::verdict::judge;
 use haptic_core::controller::params::{LAWS, Params};
@@ -115,13 +115,13 @@ pub struct TrialOutcome {
 }
 
 impl World {
-    /// The same with other drivers.
+    /// This world with other drivers.
     pub fn driven_by(mut self, drivers: Drivers) -> Self {
         self.driven_by = drivers;
         self
     }
 
-    /// The same with another of the [`LAWS`] on the ECU, by its place among them.
+    /// This world with another of the [`LAWS`] on the ECU, by its place among them.
     pub fn guided_by(mut self, law: usize) -> Self {
         self.law = law;
         self
@@ -189,7 +189,7 @@ impl World {
         self.trial(row, seed, false).0
     }
 
-    /// Those who keep a lane at every speed from one to another, km/h.
+    /// The drivers who keep a lane at every speed from one to another, km/h.
     fn able_between(&self, a_kmh: f64, b_kmh: f64) -> Vec<usize> {
         let range = a_kmh.min(b_kmh)..=a_kmh.max(b_kmh);
         let mut there = self.able.iter().filter(|(kmh, _)| range.contains(kmh));
@@ -278,7 +278,7 @@ impl World {
         (roads[side].clone(), Speed::constant_kmh(kmh), onset_ms)
     }
 
-    /// The same of a run whose speed changes.
+    /// Road, speed and onset of a run whose speed changes.
     fn changing_road(
         &self,
         row: &FaultCase,
@@ -301,7 +301,7 @@ impl World {
         (course, change.speed(onset_ms), onset_ms)
     }
 
-    /// With the car, the road and the sensors of this world, and what a row makes less than ideal.
+    /// A scenario with the car, the road and the sensors of this world, and what a row makes less than ideal.
     fn in_this_world(&self, mut scenario: ScenarioBuilder, row: &FaultCase, seed: u64) -> Scenario {
         let mut plant = self
             .kind

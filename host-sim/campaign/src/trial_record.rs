@@ -18,7 +18,7 @@ pub(super) struct TrialRecord {
     pub(super) weak_at: Option<u32>,
     /// Largest share of the margin used, up to the first change of mode after the onset.
     pub(super) used: f64,
-    /// The same of the margins that a contradiction uses, whatever the row looks at.
+    /// Largest part used of the margins that a contradiction uses, whatever the row looks at.
     pub(super) contradicted: f64,
     /// First step from the onset on with no torque in Active.
     pub(super) yielded_at: Option<u32>,

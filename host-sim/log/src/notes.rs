@@ -6,8 +6,6 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
-use crate::recording::RecordingError;
-
 /// What became of a part of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -142,15 +140,15 @@ impl Notes {
 
     /// Why there is no channel of this name, if it was left out.
     #[must_use]
-    pub fn left_out(&self, name: &str) -> Option<RecordingError> {
+    pub fn left_out(&self, name: &str) -> Option<String> {
         let is_it = |note: &&Note| {
             note.fate == Fate::LeftOut && note.names.iter().any(|own| own.eq_ignore_ascii_case(name))
         };
         let why = &self.0.iter().find(is_it)?.why;
         // A mistake in the file is all that there is to say.
         Some(match why.starts_with("line ") {
-            true => why.as_str().into(),
-            false => format!("there is no channel {name}: it was left out ({why})").into(),
+            true => why.clone(),
+            false => format!("there is no channel {name}: it was left out ({why})"),
         })
     }
 }
@@ -228,7 +226,7 @@ mod tests {
                 "1 time stamp mended: decimal comma, in line 1",
             ]
         );
-        let error = notes.left_out("mode").map(|e| e.to_string());
+        let error = notes.left_out("mode");
         assert_eq!(
             error.as_deref(),
             Some("there is no channel mode: it was left out (text)")

@@ -29,7 +29,7 @@ pub enum TableError {
         line: u64,
         /// Its fields.
         found: usize,
-        /// Those of the heading.
+        /// The fields of the heading.
         expected: usize,
     },
     /// A column that is needed is not there.

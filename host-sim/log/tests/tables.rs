@@ -302,7 +302,7 @@ fn texts_among_numbers_leave_their_column_out_with_the_line() {
     );
 }
 
-/// Of stamps that wrap, repeat, stand still or are deltas none is taken as it is, whatever the format.
+/// No stamps that wrap, repeat, stand still or are deltas are taken as they are, whatever the format.
 #[test]
 fn stamps_that_do_not_grow_are_refused() {
     let table = |stamp: fn(u32) -> f64| {

@@ -72,9 +72,9 @@ pub struct Status {
 /// How many frames came.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// Of each message, by its name.
+    /// Frames of each message, by its name.
     pub frames: BTreeMap<String, u64>,
-    /// With a length, CRC or signal that cannot be.
+    /// Frames with a length, CRC or signal that cannot be.
     pub damaged: u64,
     /// Missing by their counters, as far as these can tell: they count to 16.
     pub lost: u64,

@@ -32,7 +32,7 @@ pub enum Machine {
     /// The reference board, Cortex-M4F.
     #[default]
     An386,
-    /// The same with a Cortex-M7.
+    /// The board with a Cortex-M7.
     An500,
 }
 

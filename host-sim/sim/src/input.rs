@@ -4,9 +4,7 @@ use std::fmt::Display;
 
 use serde::de::DeserializeOwned;
 
-use crate::fields::old_name;
 pub use crate::range::{RangeError, in_range};
-use crate::scenario::fields_of;
 
 /// Bad input: which file or option, and what is wrong with it. Never a fault of the program.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -30,7 +28,7 @@ impl InputError {
 ///
 /// # Errors
 /// Line, column and what is wrong there: syntax, an unknown field, a value of the wrong kind; that the file is one of another
-/// kind, where it is; what a field of an old name is called.
+/// kind, where it is.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         // The parser speaks of Rust's types; whoever wrote the file need not know them.
@@ -39,7 +37,7 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Inpu
             .replace("expected f64", "expected a number")
             .replace("expected u64", "expected a whole number, 0 or more")
             .replace("expected path string", "expected a string");
-        match other_kind::<T>(text).or_else(|| old_name(text, fields_of)) {
+        match other_kind::<T>(text) {
             Some(hint) => InputError::new(name, hint),
             None => InputError::new(name, with_near(message)),
         }

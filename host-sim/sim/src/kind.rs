@@ -50,7 +50,7 @@ impl Parameter {
         }
     }
 
-    /// The same, which tuning varies between two values.
+    /// The parameter as one which tuning varies between two values.
     #[must_use]
     pub const fn tuned(self, low: f64, high: f64) -> Self {
         Self {

@@ -40,7 +40,7 @@ impl fmt::Display for RangeError {
 impl std::error::Error for RangeError {}
 
 impl RangeError {
-    /// The same of a field in a table.
+    /// The error of a field in a table.
     #[must_use]
     pub fn within(mut self, table: &str) -> Self {
         self.field = format!("{table}.{}", self.field);

@@ -50,7 +50,7 @@ impl Cause {
         matches!(self, Self::TorqueLost | Self::LaneLost | Self::RequestEnded)
     }
 
-    /// As the channel has it: the ECU's fault word, or a number below zero.
+    /// The value that the channel has for it: the ECU's fault word, or a number below zero.
     #[must_use]
     pub fn code(self) -> f64 {
         match self {
@@ -72,7 +72,7 @@ impl Cause {
         (code <= -1.0).then_some(plain?.0)
     }
 
-    /// Of an ECU that has left Active.
+    /// The cause for an ECU that has left Active.
     fn new(status: &Status, around: Circumstances) -> Self {
         let of_class = |class: FaultSet| match status.faults.common(class) {
             FaultSet::NONE => Self::Unnamed,

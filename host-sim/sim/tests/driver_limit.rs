@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use haptic_sim::laws::Limits;
 
 const CASES: usize = 10_000_000;
-/// As many as `tests/tools/driver_limit.c` answers at once.
+/// So many cases `tests/tools/driver_limit.c` answers at once.
 const BLOCK: usize = 10_000;
 
 /// Torque, last torque, MAX, rates up and down, allowance, factor, least and largest torque of the driver.

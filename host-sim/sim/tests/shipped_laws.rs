@@ -45,13 +45,15 @@ impl Rate {
     }
 }
 
-/// The law in f64 at the instants of the ECU's, which looks at each column frame, one in 2 ms.
+/// The law in f64 at the instants of the ECU's, which looks at each column frame, one in 2 ms, in the step after it.
 #[derive(Clone)]
 struct Sampled {
     paper: Gains,
     least: f64,
     rate: Rate,
     looked_s: f64,
+    /// The view of the last frame and what (9) asked for then, until they are looked at.
+    pending: Option<(LawView, f64)>,
     agreement: f64,
     size: f64,
     share: f64,
@@ -67,6 +69,7 @@ impl Sampled {
                 rate: 0.0,
             },
             looked_s: 0.0,
+            pending: None,
             agreement: 0.0,
             size: 0.0,
             share: 1.0,
@@ -91,7 +94,9 @@ impl Law for Sampled {
     fn ask(&mut self, view: &LawView) -> f64 {
         let asked_nm = self.paper.ask(view);
         if view.step.is_multiple_of(2) {
-            self.look(view, asked_nm);
+            self.pending = Some((*view, asked_nm));
+        } else if let Some((view, asked_nm)) = self.pending.take() {
+            self.look(&view, asked_nm);
         }
         self.share * asked_nm
     }

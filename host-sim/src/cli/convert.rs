@@ -10,7 +10,7 @@ use haptic_log::recording::{Line, Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
-use super::recording::ReadingArguments;
+use super::recording::{ReadingArguments, print_reading};
 use super::{BadInput, Outcome, in_file, output, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
@@ -150,13 +150,6 @@ fn list(table: Vec<Line>, notes: &Notes, json: bool) -> Result<(), BadInput> {
     let space = if said.is_empty() { "" } else { "\n" };
     let table = listed(table).to_text(width());
     print(&format!("{}{space}{said}", table.trim_end()))
-}
-
-/// What the file that is written does not hold as the other did, on stderr.
-pub(super) fn print_reading(notes: &Notes) {
-    for note in notes.iter() {
-        eprintln!("note: {note}");
-    }
 }
 
 fn listed(table: Vec<Line>) -> Table {

@@ -43,7 +43,7 @@ pub(super) struct Arguments {
     /// Run in QEMU: the image takes the ECU's place, for the rows marked Q
     #[arg(long)]
     target: bool,
-    /// Print the table of faults, as docs/reference/fault-campaign.md has it, and run nothing
+    /// Print the table of faults in Markdown: what each injects, its class, the reaction and its deadline, the largest torque; run nothing
     #[arg(long, conflicts_with_all = ["rows", "world", "drivers", "law", "seeds", "first_seed", "seed", "target", "json", "out"])]
     list: bool,
     #[command(flatten)]

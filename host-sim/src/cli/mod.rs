@@ -4,7 +4,7 @@
 //! installed. Results go to stdout, all else (progress, where the files are, what is wrong) to stderr; with `--json`
 //! stdout holds one JSON object.
 //!
-//! One file per command; their groups in `--help` and their older names are in `names`. Not here: anything that a study or a model decides.
+//! One file per command; their groups in `--help` are in `names`. Not here: anything that a study or a model decides.
 
 mod adaptation;
 mod availability;
@@ -244,7 +244,7 @@ fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
     print(&serde_json::to_string_pretty(value)?)
 }
 
-/// Those of the names, all if there is none.
+/// The values of the names, all if there is no name.
 fn chosen<T>(
     option: &str,
     names: &[String],

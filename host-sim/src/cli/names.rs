@@ -1,9 +1,12 @@
-//! Names of the command line: the commands by purpose, and what a name of an older version is called today.
+//! Names of the command line: the commands by purpose, and what is said of a name that is none.
 
 use std::ffi::OsString;
 use std::fmt::Write;
 
+use clap::CommandFactory;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
+
+use super::Cli;
 
 /// The commands as `--help` lists them.
 const GROUPS: [(&str, &str); 5] = [
@@ -18,27 +21,6 @@ const GROUPS: [(&str, &str); 5] = [
     ),
     ("The ECU in simulation", "faults availability handover reliance"),
     ("The ECU on a bus", "ecu"),
-];
-
-/// Command (none: the program itself), name of an older version, what replaces it.
-const RENAMED: [(&str, &str, &str); 17] = [
-    ("", "pil", "host-sim ecu pil"),
-    ("", "live", "host-sim ecu live"),
-    ("", "parameters", "host-sim ecu parameters"),
-    ("", "bus", "host-sim ecu bus"),
-    ("ecu", "--listen", "host-sim ecu run --listen"),
-    ("ecu", "--for", "host-sim ecu run --for"),
-    ("identify", "--whole", "--no-preprocessing"),
-    ("identify", "--bridge", "--max-gap"),
-    ("identify", "--exact-lane", "--no-lane-smoothing"),
-    ("sweep", "--plan", "--dry-run"),
-    ("study", "--plan", "--dry-run"),
-    ("experiment", "--coverage", "host-sim validate --coverage"),
-    ("experiment", "--repetitions", "host-sim validate --coverage"),
-    ("experiment", "--spoiled", "host-sim validate --corruptions"),
-    ("experiment", "--methods", "host-sim validate --methods"),
-    ("experiment", "--only", "host-sim validate --only"),
-    ("availability", "--most-per-hour", "--max-rate"),
 ];
 
 /// The program's help with its commands in groups, which clap itself has not.
@@ -67,7 +49,7 @@ fn with_signs(command: clap::Command) -> clap::Command {
     })
 }
 
-/// The sentence for a name of an older version, or for an option of the evaluation without its command.
+/// The sentence for a command of the ECU without `ecu`, or for an option of the evaluation without its command.
 pub(super) fn explain(error: &clap::Error, arguments: &[OsString]) -> Option<String> {
     let kind = match error.kind() {
         ErrorKind::InvalidSubcommand => ContextKind::InvalidSubcommand,
@@ -77,25 +59,17 @@ pub(super) fn explain(error: &clap::Error, arguments: &[OsString]) -> Option<Str
     let Some(ContextValue::String(name)) = error.get(kind) else {
         return None;
     };
-    let words = arguments.iter().skip(1);
-    let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
-    let first = words.first()?;
-    let is_it =
-        |(command, old, _): &&(&str, &str, &str)| name == old && (command.is_empty() || first == command);
-    let renamed = RENAMED.iter().find(is_it);
-    if let Some((_, old, new)) = renamed {
-        return Some(format!("`{old}` is `{new}`"));
-    }
-    // A command of the ECU, or what looks like one.
-    let of_ecu = |(_, old, new): &&(&str, &str, &'static str)| {
-        new.starts_with("host-sim ecu ") && (old.starts_with(name.as_str()) || name.starts_with(old))
-    };
-    if let Some((.., new)) = RENAMED
+    let words: Vec<_> = arguments
         .iter()
-        .find(of_ecu)
-        .filter(|_| name.len() > 2 && name == first)
-    {
-        return Some(format!("there is no command `{name}`; did you mean `{new}`?"));
+        .skip(1)
+        .map(|word| word.to_string_lossy())
+        .collect();
+    let first = words.first()?;
+    let program = Cli::command();
+    if program.find_subcommand("ecu")?.find_subcommand(name).is_some() {
+        return Some(format!(
+            "there is no command `{name}`; did you mean `host-sim ecu {name}`?"
+        ));
     }
     let own_option = name.starts_with('-') && first.starts_with('-');
     own_option.then(|| {
@@ -110,9 +84,6 @@ pub(super) fn explain(error: &clap::Error, arguments: &[OsString]) -> Option<Str
 mod tests {
     use std::collections::BTreeSet;
 
-    use clap::CommandFactory;
-
-    use super::super::Cli;
     use super::*;
 
     #[test]
@@ -127,7 +98,7 @@ mod tests {
         );
     }
 
-    /// As a terminal of 80 columns shows it: these lines are not wrapped.
+    /// A terminal of 80 columns shows each line whole: these lines are not wrapped.
     #[test]
     fn a_line_of_the_list_fits() {
         let help = grouped(Cli::command()).render_help().to_string();

@@ -101,7 +101,7 @@ impl Output {
         Self::beside(directory, command, &[])
     }
 
-    /// The same, where the command keeps files by other means too.
+    /// Begins the output of a command that keeps files by other means too.
     pub(super) fn beside(directory: &Path, command: &str, keeps: &[&str]) -> Result<Self, BadInput> {
         catch_interrupts()?;
         let mut unfinished = lock_unfinished();

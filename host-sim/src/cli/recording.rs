@@ -11,10 +11,10 @@ use haptic_analysis::identify::{
 use haptic_batch::files::load_scenario;
 use haptic_batch::identify::single_track;
 use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
+use haptic_log::notes::Notes;
 use haptic_log::recording::{Recording, RecordingError, Term};
 use haptic_sim::input::in_range;
 
-use super::convert::print_reading;
 use super::{BadInput, in_file, progress};
 
 /// New names, each with the channel that gets it.
@@ -227,7 +227,7 @@ impl RecordingArguments {
         self.open_other(&self.log, manual, stretches)
     }
 
-    /// The same of another file, understood in the same way.
+    /// Another file, understood in the way of the first.
     pub(super) fn open_other(
         &self,
         path: &Path,
@@ -236,5 +236,12 @@ impl RecordingArguments {
     ) -> Result<(DriveLog, Vec<String>), BadInput> {
         self.reading
             .open(path, manual, stretches, self.vehicle.as_deref())
+    }
+}
+
+/// What the file that is written does not hold as the other did, on stderr.
+pub(super) fn print_reading(notes: &Notes) {
+    for note in notes.iter() {
+        eprintln!("note: {note}");
     }
 }

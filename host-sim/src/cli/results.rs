@@ -46,7 +46,7 @@ pub(super) struct StudyFile {
 }
 
 impl ResultArguments {
-    /// Of a command whose `--out` has a default.
+    /// The directory of a command whose `--out` has a default.
     pub(super) fn directory(&self) -> &Path {
         self.out.as_deref().unwrap_or(Path::new(""))
     }
@@ -56,7 +56,7 @@ impl ResultArguments {
         self.begin_beside(command, &[])
     }
 
-    /// The same, where the command keeps files by other means too.
+    /// Begins the results of a command that keeps files by other means too.
     pub(super) fn begin_beside(&self, command: &str, keeps: &[&str]) -> Result<Results<'_>, BadInput> {
         let place = self.out.as_deref();
         let output = place.map(|place| Output::beside(place, command, keeps));
@@ -66,7 +66,7 @@ impl ResultArguments {
         })
     }
 
-    /// The same, where the files are there already.
+    /// Results of a command whose files are there already.
     pub(super) fn without_files(&self) -> Results<'_> {
         Results {
             arguments: self,
@@ -85,7 +85,7 @@ pub(super) struct Results<'a> {
 }
 
 impl Results<'_> {
-    /// With another name of the file with the results.
+    /// Gives the file with the results another name.
     pub(super) fn named(self, file: &'static str) -> Self {
         Self { file, ..self }
     }
@@ -105,7 +105,7 @@ impl Results<'_> {
         self.show_bare(report, &report.stamp(results), holds)
     }
 
-    /// The same of results that say by themselves where they come from.
+    /// Shows results that say by themselves where they come from.
     pub(super) fn show_bare(
         self,
         report: &Report,

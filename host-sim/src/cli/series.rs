@@ -9,7 +9,7 @@ pub(super) enum SeriesArgument {
     None,
     /// CSV with units in the column names
     Csv,
-    /// The same, compressed with gzip
+    /// CSV compressed with gzip
     CsvGz,
 }
 

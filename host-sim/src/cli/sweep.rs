@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     /// differs); its scenario is in the printed text
     #[arg(long, value_name = "ROW", conflicts_with_all = ["shard", "threads", "dry_run", "json"])]
     replay: Option<u64>,
-    /// With --replay: also the scenario, the time series, figures and report of that drive into this directory
+    /// Also write the scenario, the time series, figures and report of the drive of --replay into this directory
     #[arg(long, value_name = "DIR", requires = "replay")]
     replay_out: Option<PathBuf>,
     /// Only check the file, and print how many drives it plans, with its first rows

@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     /// a torsion bar that feels the wheel), read each as `identify --layout openlka` does, and count as --corruptions does
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
     recordings: Option<u32>,
-    /// Of --corruptions and --changes: only those whose name holds this
+    /// Only those of --corruptions and --changes whose name holds this
     #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings"])]
     only: String,
     #[command(flatten)]

@@ -133,50 +133,20 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     assert_eq!(notes, "of somebody");
 }
 
-/// Who knows a name of an older version, mistypes one or forgets the command, is told what to write.
+/// Who mistypes a name or forgets the command is told what to write.
 #[test]
 fn another_name_is_answered_with_the_right_one() {
     let directory = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &str); 22] = [
+    let cases: [(&[&str], &str); 10] = [
         (
-            &["parameter"],
-            "there is no command `parameter`; did you mean `host-sim ecu parameters`?",
+            &["pil"],
+            "there is no command `pil`; did you mean `host-sim ecu pil`?",
         ),
-        (&["buss"], "did you mean `host-sim ecu bus`?"),
-        (&["pil"], "error: `pil` is `host-sim ecu pil`\n"),
-        (&["live", "--can", "can0"], "`live` is `host-sim ecu live`"),
         (
             &["parameters", "--can=can0"],
-            "`parameters` is `host-sim ecu parameters`",
+            "did you mean `host-sim ecu parameters`?",
         ),
-        (&["help", "bus"], "`bus` is `host-sim ecu bus`"),
-        (
-            &["ecu", "--listen", "127.0.0.1:0"],
-            "`--listen` is `host-sim ecu run --listen`",
-        ),
-        (
-            &["identify", "a.csv", "--whole"],
-            "`--whole` is `--no-preprocessing`",
-        ),
-        (&["identify", "--bridge=0.2"], "`--bridge` is `--max-gap`"),
-        (
-            &["identify", "--exact-lane"],
-            "`--exact-lane` is `--no-lane-smoothing`",
-        ),
-        (&["sweep", "s.toml", "--plan"], "`--plan` is `--dry-run`"),
-        (&["study", "--plan", "s.toml"], "`--plan` is `--dry-run`"),
-        (
-            &["availability", "--most-per-hour", "1"],
-            "`--most-per-hour` is `--max-rate`",
-        ),
-        (
-            &["experiment", "--spoiled", "2"],
-            "`--spoiled` is `host-sim validate --corruptions`",
-        ),
-        (
-            &["experiment", "--probe", "0.2", "--coverage=9"],
-            "`host-sim validate --coverage`",
-        ),
+        (&["help", "bus"], "did you mean `host-sim ecu bus`?"),
         (
             &["experiment", "--participants", "1,3..5"],
             "`--participant 1,3..5` says which ones",

@@ -18,7 +18,7 @@ pub(super) const GOES_ON_MS: u32 = ms(coast::EXTRAPOLATION_PERIOD);
 /// How long before the failure it is watched, ms: all that the past keeps, in whole periods of what it keeps of a camera.
 const WATCHED_MS: u32 = 1200;
 const KEPT_MS: u32 = 25;
-/// Of trust, in a second.
+/// How fast trust falls, in a second.
 const FALL: i32 = bits(coast::BLIND_FALL.si());
 
 /// A run whose preview fails.

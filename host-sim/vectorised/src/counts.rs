@@ -9,15 +9,15 @@ pub(super) const MS: i64 = 1000 * 4295;
 /// What the bus carries of a speed, m/s.
 const FASTEST: i32 = 90;
 
-/// As core turns SI values into bits; saturates.
+/// The bits that core makes of an SI value; saturates.
 #[inline(always)]
 pub(super) const fn bits(si: f64) -> i32 {
     let scaled = si * ONE;
     (if scaled >= 0.0 { scaled + 0.5 } else { scaled - 0.5 }) as i32
 }
 
-/// The same of a value that is no larger than 100, in steps that every machine has for several lanes at once: a conversion
-/// that saturates is made one by one.
+/// The bits of a value that is no larger than 100, in steps that every machine has for several lanes at once: a
+/// conversion that saturates is made one by one.
 #[inline(always)]
 pub(super) fn small_bits(si: f64) -> i32 {
     let scaled = si * ONE;

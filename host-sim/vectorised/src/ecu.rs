@@ -52,7 +52,7 @@ const PAST: usize = 16;
 lanes! {
     /// The ECUs.
     pub(super) struct Ecus {
-        /// Of the rates' filter, 2^-8 us.
+        /// Time constant of the rates' filter, 2^-8 us.
         tau: i32 = 1,
         /// Share of the law's torque at this speed.
         scheduled: i32 = 0,

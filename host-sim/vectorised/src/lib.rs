@@ -111,7 +111,7 @@ pub struct Step {
 }
 
 impl From<&Outcome<'_>> for Step {
-    /// Of a run alone, without errors of sensors: what they have is what is true.
+    /// The step of a run alone, without errors of sensors: what they have is what is true.
     fn from(outcome: &Outcome<'_>) -> Self {
         Self {
             step: outcome.observation.step,

@@ -17,7 +17,7 @@ lanes! {
         pub(super) e_y: f64 = 0.0,
         pub(super) e_theta: f64 = 0.0,
     } beside {
-        /// The same, s.
+        /// How far ahead they are, s.
         pub(super) times_s: [[f64; N]; 2] = [[0.0; N]; 2],
         near: Tracked<N> = Tracked::new(),
         pub(super) far: Tracked<N> = Tracked::new(),

@@ -91,7 +91,7 @@ impl<const N: usize> Probes<N> {
     }
 }
 
-/// Of a phase whose full range is a turn, in 2^-30.
+/// The sine of a phase whose full range is a turn, in 2^-30.
 #[inline(always)]
 fn sine(phase: u32) -> i32 {
     let turn = phase as i32;

@@ -11,7 +11,7 @@ lanes! {
         torque_bias: f64 = 0.0,
         angle_bias: f64 = 0.0,
     } beside {
-        /// Of the runs whose sensors have errors.
+        /// The sensors of the runs in which they have errors.
         own: [Option<Box<Sensing>>; N] = [const { None }; N],
         is_any: bool = false,
     }

@@ -40,7 +40,7 @@ lanes! {
         pub(super) found_curvature: f64 = 0.0,
         cell: usize = 0,
     } beside {
-        /// Of the cell of each point, and the most bent of them.
+        /// The shape of the cell of each point, and the most bent of them.
         shapes: [u8; N] = [STRAIGHT; N],
         shape: u8 = STRAIGHT,
     }

@@ -19,7 +19,7 @@ pub(super) struct Kept {
 pub(super) struct Origin {
     pub(super) command: String,
     pub(super) commit: String,
-    /// Of the commit.
+    /// The date of the commit.
     pub(super) date: String,
     /// The rule that was fixed before.
     pub(super) rule: Rule,
@@ -133,7 +133,7 @@ pub(super) struct Lost {
 }
 
 impl Campaign {
-    /// Of all rows of a campaign.
+    /// A campaign with all its rows.
     pub(super) fn new(mut rows: Vec<Row>, share_limit: Option<f64>, keeps: Keeps) -> Self {
         let sum = |of: fn(&Row) -> u64| rows.iter().map(of).sum();
         let sums = Sums {

@@ -108,7 +108,7 @@ pub(super) enum Form {
     Ended,
     /// What campaigns sum up to, a column each.
     Sums,
-    /// The same by class.
+    /// What campaigns sum up to by class.
     Classes,
     /// Rows of class C by how far their torque pushed the vehicle.
     Pushed,
@@ -120,7 +120,7 @@ pub(super) enum Form {
     Left(Vec<String>),
     /// False declarations, a line for each world.
     Availability,
-    /// The same with a line for each road.
+    /// False declarations, a line for each world and road.
     AvailabilityByRoad,
 }
 
@@ -138,7 +138,7 @@ impl List {
         Self::parse(&text).context(LIST)
     }
 
-    /// With every name looked up.
+    /// Parses a list and looks up every name in it.
     pub(super) fn parse(text: &str) -> Result<Self> {
         let mut list: Self = toml::from_str(text)?;
         for (name, measurement) in &mut list.measurement {

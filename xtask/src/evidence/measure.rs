@@ -10,7 +10,8 @@ use serde::Deserialize;
 use super::kept::{Campaign, Cell, Earlier, Kept, Numbers, Origin, Row};
 use super::list::{List, Measurement, Rule, Seeds};
 use super::{all_kept, document, kept_in, replace, stale};
-use crate::tool::{Built, Usage, command, output, root};
+use crate::built::Built;
+use crate::tool::{Usage, command, output, root};
 
 /// What a person wants other than the list has it.
 pub(super) struct Asked<'a> {

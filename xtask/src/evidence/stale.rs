@@ -52,7 +52,7 @@ impl fmt::Display for State {
     }
 }
 
-/// Of a measurement, with what is kept of it.
+/// The state of a measurement, with what is kept of it.
 pub(super) fn state(measurement: &Measurement, kept: Option<&Kept>) -> Result<State> {
     let Some(Kept { origin, .. }) = kept else {
         return Ok(State::Missing);

@@ -111,7 +111,7 @@ fn head<'a>(first: &[&'a str], columns: &Columns<'a>) -> Vec<&'a str> {
     first.iter().copied().chain(titles).collect()
 }
 
-/// With thousands set apart.
+/// A number with thousands set apart.
 fn count(number: u64) -> String {
     let digits = number.to_string();
     let groups = digits.as_bytes().rchunks(3).rev().map(String::from_utf8_lossy);

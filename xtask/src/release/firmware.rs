@@ -9,8 +9,9 @@ use clap::ValueEnum;
 use super::archive::Entry;
 use super::{Part, Release};
 use crate::boards::Board;
+use crate::built::Built;
 use crate::image::Image;
-use crate::tool::{self, Built, command, llvm, root, run};
+use crate::tool::{self, command, llvm, root, run};
 
 /// Every board; in a dry run QEMU's alone, whose libraries are small.
 pub(super) fn images(release: &Release) -> Result<()> {

@@ -15,7 +15,8 @@ use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
 
-use crate::tool::{ALL_FORMATS, Built, cargo, output, root, run};
+use crate::built::Built;
+use crate::tool::{ALL_FORMATS, cargo, output, root, run};
 use crate::{dist, fmu, web, wheel};
 use archive::Entry;
 

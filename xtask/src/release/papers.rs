@@ -226,7 +226,7 @@ fn bill(
     Ok(serde_json::to_string_pretty(&bill)? + "\n")
 }
 
-/// Of the packages that came from a registry, as Cargo.lock holds them.
+/// Checksums of the packages that came from a registry, as Cargo.lock holds them.
 fn checksums() -> Result<BTreeMap<Crate, String>> {
     let text = fs::read_to_string(root().join("Cargo.lock")).context("Cargo.lock")?;
     let lock: toml::Table = text.parse().context("Cargo.lock")?;

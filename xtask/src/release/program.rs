@@ -9,7 +9,8 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::archive::{self, Entry};
 use super::{Part, Release, copy_into};
-use crate::tool::{ALL_FORMATS, Built, HOST_SIM, command, llvm, output, root, run};
+use crate::built::Built;
+use crate::tool::{ALL_FORMATS, HOST_SIM, command, llvm, output, root, run};
 use crate::{dist, venv, wheel};
 
 /// The archive: program, examples, and a page that says what to do first.
@@ -78,7 +79,7 @@ fn old_enough(program: &Path, release: &Release) -> Result<()> {
     Ok(())
 }
 
-/// Of versions such as GLIBC_2.17 in what readobj says.
+/// The newest of versions such as GLIBC_2.17 in what readobj says.
 fn newest_glibc(said: &str) -> Option<(u32, u32)> {
     let versions = said.split("GLIBC_").skip(1).filter_map(|rest| {
         let end = rest.find(|c: char| c != '.' && !c.is_ascii_digit())?;

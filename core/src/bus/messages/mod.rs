@@ -154,10 +154,10 @@ pub trait Message<const N: usize = 8>: Copy {
         Self::decode_within(state, frame, Self::MAX_DELTA)
     }
 
-    /// The same, with the step of the counter that may have been lost: more, the longer the sender was silent.
+    /// Checks a frame and decodes it, with the step of the counter that may have been lost: more, the longer the sender was silent.
     ///
     /// # Errors
-    /// As [`Message::decode`].
+    /// See [`Message::decode`].
     #[inline(always)]
     fn decode_within<const C: usize>(
         state: &mut ReceiverState,

@@ -49,7 +49,7 @@ fn each_parameter_reaches_monitor_and_estimator() {
         a_4: 0.7,
         torque_limit_nm: 4.2,
         wind_up_nm_per_s: 3.2,
-        reduction_nm_per_s: 6.0,
+        reduction_nm_per_s: 6.2,
         probe_amplitude_nm: 0.123_4,
         probe_frequency_hz: 2.3,
         t_nms_s: 0.08,
@@ -63,7 +63,7 @@ fn each_parameter_reaches_monitor_and_estimator() {
         limit_mnm: 4200,
         // Up to whole mN.m.
         growth_mnm_per_ms: 4,
-        fall_mnm_per_ms: 6,
+        fall_mnm_per_ms: 7,
         band_mnm: 364,
         probe_mnm: 124,
         gains_mnm: [750, 10_000, 50, 350],

@@ -8,7 +8,7 @@ use crate::controller::memory::ChangedParts;
 use crate::lane::LaneSample;
 use crate::law::{EgoMotion, LawState};
 use crate::quantity::{Instant, Metres, Micros, Radians, Torque, TurningRate, per_second, product};
-use crate::safety::coast::{EXTRAPOLATION_PERIOD, PictureVerdict};
+use crate::safety::coast::{Compared, EXTRAPOLATION_PERIOD, PictureVerdict};
 use crate::safety::faults::{Fault, FaultSet};
 use crate::safety::plausibility::lane_step_is_possible;
 
@@ -61,14 +61,8 @@ impl<I: Injection> Step<'_, I> {
 
     /// What a picture after a silence, or beside a line that it does not show, makes of the lane.
     fn compare_picture(&mut self, last: &LaneSample, sample: LaneSample, demanded: Torque) {
-        let agrees = lane_step_is_possible(&self.extrapolated_lane(last, sample.at), &sample);
-        let (checks, motion_history) = (&self.config.plausibility, &mut self.once.motion_history);
-        let follows = checks.other_line_follows(&self.memory.plausibility, motion_history, self.now);
-        let verdict = self
-            .memory
-            .coast
-            .picture_arrived(&sample, [agrees, follows], demanded);
-        match verdict {
+        let compared = self.compared(last, &sample);
+        match self.memory.coast.picture_arrived(&sample, compared, demanded) {
             // From the extrapolated line to the picture is a jump, and no rate.
             PictureVerdict::Returned => {
                 self.memory.law.relocate(sample);
@@ -84,6 +78,21 @@ impl<I: Injection> Step<'_, I> {
         }
         self.changed.add(ChangedParts::LAW);
         self.changed.add(ChangedParts::LANE);
+    }
+
+    /// How a picture compares with the line that was extrapolated, and with another line that was watched.
+    fn compared(&mut self, last: &LaneSample, sample: &LaneSample) -> Compared {
+        if self.memory.coast.may_agree()
+            && lane_step_is_possible(&self.extrapolated_lane(last, sample.at), sample)
+        {
+            return Compared::Agrees;
+        }
+        let (checks, motion_history) = (&self.config.plausibility, &mut self.once.motion_history);
+        if checks.other_line_follows(&self.memory.plausibility, motion_history, self.now) {
+            Compared::OtherLineFollows
+        } else {
+            Compared::OtherLine
+        }
     }
 
     fn extrapolated_lane(&self, last: &LaneSample, at: Instant) -> LaneSample {

@@ -6,6 +6,7 @@ use crate::controller::inputs::{Input, Request};
 use crate::controller::memory::ChangedParts;
 use crate::lane::LaneSample;
 use crate::law::Law;
+use crate::law::activity::Sample;
 use crate::quantity::{Micros, Ratio, Torque, share_of};
 use crate::safety::envelope::{LimitReason, Situation};
 use crate::safety::faults::{Fault, FaultSet};
@@ -85,8 +86,9 @@ impl<I: Injection> Step<'_, I> {
             .step(&mut self.memory.fast.probe, self.elapsed, wanted)
     }
 
-    /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
-    /// ends guidance then. Without a lane the torque is zero.
+    /// The torque of (9) times four shares: the authority that the host asks for, that of the schedule at this speed, the trust in
+    /// the lane, and what the law leaves. Without a request the authority is 1: the mode ends guidance then. Without a lane the
+    /// torque is zero.
     fn guidance(&mut self) -> Torque {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !self.memory.law.is_latest(&sample) {
@@ -122,11 +124,16 @@ impl<I: Injection> Step<'_, I> {
                 coefficients,
                 least_share,
             } => {
+                let sample = match &self.inputs.column {
+                    Input::New(column) => Some(Sample {
+                        at: self.now,
+                        wheel: column.wheel_angle,
+                        torques: [column.driver_torque, asked],
+                    }),
+                    Input::Held(_) | Input::Lost => None,
+                };
                 let activity = &mut self.once.activity;
-                if let Input::New(column) = &self.inputs.column {
-                    let torques = [column.driver_torque, asked];
-                    activity.update(coefficients, self.now, column.wheel_angle, torques);
-                }
+                activity.step(coefficients, sample);
                 activity.share(*least_share)
             }
         }

@@ -1,13 +1,12 @@
 //! Whether the torques on the steering column balance.
 //!
-//! The torques on the steering column balance: `T_d + T_a + T_h = c_a*v*psi_dot + B_s*dphi/dt`. Not all
-//! of them are known exactly. The power assist `T_a` acts in the direction of `T_d` and is at most [`ASSIST`] times
-//! as large; the aligning torque `c_a*v*psi_dot` may be wrong by 30 % (trail, tyres, load); and there is friction. So
-//! the imbalance is an interval. Its value nearest to zero is summed with a time constant of 1 s: the sum is the
-//! least momentum that is unaccounted for, whatever assist, friction and aligning torque were. A short push by the
-//! hand that the column answers later cancels in this sum. The inertia (0.11 kg.m2, 0.02 N.m.s at the speeds of a
-//! hand) is far below the margin. A constant torque (a banked road, a pull to one side, the offset of the sensor) is
-//! estimated slowly, within bounds.
+//! Without inertia they obey `T_d + T_a + T_h = c_a*v*psi_dot + B_s*dphi/dt`. Not all of them are known exactly. The
+//! power assist `T_a` acts in the direction of `T_d` and is at most [`ASSIST`] times as large; the aligning torque
+//! `c_a*v*psi_dot` may be wrong by 30 % (trail, tyres, load); and there is friction. So the imbalance is an interval.
+//! Its value nearest to zero is summed with a time constant of 1 s: the sum is the least momentum that is unaccounted
+//! for, whatever assist, friction and aligning torque were. A short push by the hand that the column answers later
+//! cancels in this sum. The inertia (0.11 kg.m2, 0.02 N.m.s at the speeds of a hand) is far below the margin. A
+//! constant torque (a banked road, a pull to one side, the offset of the sensor) is estimated slowly, within bounds.
 
 use fixed::types::{I0F32, I8F24};
 

@@ -53,6 +53,7 @@ words! {
         /// another sensor.
         pub(super) is_alive: u32,
         pub(super) last: LaneSample,
+        /// The movement of the near point that was predicted and the one that was observed, each summed with a time constant of 1 s.
         pub(super) predicted: Metres,
         pub(super) seen: Metres,
         /// The long-run error of the prediction, which corrects it.

@@ -15,8 +15,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::log::DriveLog;
-use super::signals::SWITCH_RATE_NM_S;
+use super::log::{DriveLog, SWITCH_RATE_NM_S};
 use super::wide::{add_times, dot};
 
 /// Time constant of each stage of the low-pass, s.

@@ -15,7 +15,7 @@
 //! any fraction of a sample, and so is its derivative:
 //! `d/dt_p L[u](t - t_p) = -(u - L[u])(t - t_p) / t_nms`.
 
-use super::log::DriveLog;
+use super::log::{DriveLog, SWITCH_RATE_NM_S};
 use super::wide::{BLOCK, window};
 
 /// The muscle of equation (8), taken as known (table 4).
@@ -35,9 +35,6 @@ impl Default for Muscle {
         }
     }
 }
-
-/// A torque that changes faster than this, N.m/s, has switched: it is the fastest that the envelope allows.
-pub(super) const SWITCH_RATE_NM_S: f64 = 8.0;
 
 /// The ECU decides a torque every so many seconds, counted from time zero of the log.
 const ECU_PERIOD_S: f64 = 1e-3;

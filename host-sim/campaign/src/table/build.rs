@@ -1,8 +1,7 @@
 //! How a row of the table says what it asks of the ECU: by methods in a chain behind its injections.
 
-use super::{CONTRADICTION_MS, Class, Expect, FaultCase, Place, PlaceOnRoad};
+use super::{CONTRADICTION_MS, Class, Expect, FaultCase, LONG_AFTER_MS, Place, PlaceOnRoad};
 use crate::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LOCKED};
-use crate::deviation::LONG_AFTER_MS;
 use crate::injection::Start;
 use crate::residual::Detectability;
 use haptic_sim::models::nonlinear::WorldParameters;

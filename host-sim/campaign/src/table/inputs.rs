@@ -19,7 +19,7 @@ const JERK: Injection = Injection::Hand(Hand::Jerk {
     before_ms: 300,
 });
 
-/// The same half a second after the onset.
+/// A jerk half a second after the onset.
 const SWERVE: Injection = Injection::Hand(Hand::Jerk {
     peak_nm: 2.5,
     ms: 600,

@@ -273,7 +273,7 @@ fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, Recordi
     let Some(place) = place else {
         let bare = units::bare(wanted);
         if let Some(error) = table.notes.left_out(bare) {
-            return Err(error);
+            return Err(error.into());
         }
         let names = columns.iter().map(|c| &c.name).chain(&table.unread);
         let names: Vec<&str> = names.take(8).map(String::as_str).collect();

@@ -208,7 +208,8 @@ impl Recording {
             [] => Err(self
                 .notes
                 .left_out(units::bare(name))
-                .unwrap_or_else(|| format!("there is no channel {name}{}", self.near(name)).into())),
+                .unwrap_or_else(|| format!("there is no channel {name}{}", self.near(name)))
+                .into()),
             [(first, a), (second, b), ..] if std::ptr::eq(first, second) => Err(format!(
                 "channel {name} is there twice, as {} and as {}: say which",
                 a.name, b.name

@@ -25,7 +25,7 @@ struct Cybernetic {
     k_t: f64,
     t_n: f64,
     k_hg: f64,
-    /// Of the lag, of the delay, and the torque.
+    /// States of the lag and of the delay, and the torque.
     state: [f64; 3],
 }
 

@@ -223,8 +223,9 @@ fn published_drivers_are_those_of_the_simulator() {
     }
 }
 
-/// With their defaults all keep the lane of the paper's course, each habit around the paper's driver too. The law is the paper's, but
-/// for the relay: a driver who yields wholly to a guidance on the side of the target leaves the lane under one that cannot steer alone.
+/// All drivers with their defaults keep the lane of the paper's course, each habit around the paper's driver too. The
+/// law is the paper's, but for the relay: a driver who yields wholly to a guidance on the side of the target leaves the
+/// lane under one that cannot steer alone.
 #[test]
 fn every_driver_keeps_the_lane() {
     let scenario = Scenario::default();

@@ -7,7 +7,6 @@
 //! variables of an FMU, the stub for Python and the tables of `docs/files.md` follow from it.
 
 mod in_file;
-mod old_names;
 
 use serde::de::{DeserializeOwned, MapAccess};
 use serde::ser::{Serialize, SerializeMap};
@@ -16,7 +15,6 @@ use crate::range::{RangeError, in_range};
 
 pub(crate) use in_file::InFile;
 pub use in_file::from_numbers;
-pub(crate) use old_names::old_name;
 /// Why numbers by name are no table: a name that there is not, or one that lacks.
 pub use toml::de::Error as NotATable;
 

@@ -13,7 +13,7 @@ pub struct FloatLaw {
 }
 
 impl FloatLaw {
-    /// With the gains and the absolute limit of `gains`; its filter corner is not used.
+    /// The law with the gains and the absolute limit of `gains`; its filter corner is not used.
     pub fn new(gains: Params) -> Self {
         Self { gains, last: None }
     }

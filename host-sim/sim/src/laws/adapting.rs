@@ -1,7 +1,8 @@
 //! Laws whose gain on (9) follows the driver.
 //!
 //! *Driver activity*: `T = lambda*T_9`, `lambda = 1 - (1 - lambda_min)*max(0, -c)`, where c is the agreement of the pseudo-powers
-//! `P_d = T_d*dphi/dt` and `P_h = T_h*dphi/dt`: `c = L[T_d*T_h*dphi^2]/L[|T_d*T_h|*dphi^2]`, L a low-pass. Source: the pseudo-power
+//! `P_d = T_d*dphi/dt` and `P_h = T_9*dphi/dt`: `c = L[T_d*T_9*dphi^2]/L[|T_d*T_9|*dphi^2]`, L a low-pass. T_9 is what (9) asks for,
+//! before any share of it is taken: with the torque applied in its place c would depend on lambda itself. Source: the pseudo-power
 //! pair of Saito et al. and the cooperativeness of Nguyen, Rath, Lv, Guerra and Lauber 2021 (Sensors 21:4647), of both of which
 //! abstracts were seen; c, lambda_min and the low-pass are chosen here, and the U-shape over the driver's activity is left out,
 //! whose constants were not seen.
@@ -24,7 +25,7 @@ struct Activity {
     law: Gains,
     least: f64,
     weight: f64,
-    /// The low-passed product of the pseudo-powers, and that of their sizes.
+    /// `P_d*P_h` behind the low-pass, and its size behind the same one.
     agreement: [f64; 2],
     /// What of the law's torque is left.
     share: f64,
@@ -32,8 +33,9 @@ struct Activity {
 
 impl Law for Activity {
     fn ask(&mut self, view: &LawView) -> f64 {
+        let asked_nm = self.law.ask(view);
         let rate = view.wheel_rate_rad_per_s;
-        let product = view.driver_torque_nm * view.guidance_torque_nm * rate * rate;
+        let product = view.driver_torque_nm * asked_nm * rate * rate;
         self.agreement[0] += self.weight * (product - self.agreement[0]);
         self.agreement[1] += self.weight * (product.abs() - self.agreement[1]);
         let [signed, size] = self.agreement;
@@ -43,7 +45,7 @@ impl Law for Activity {
             0.0
         };
         self.share = 1.0 - (1.0 - self.least) * against;
-        self.share * self.law.ask(view)
+        self.share * asked_nm
     }
 
     fn k_1(&self) -> Option<f64> {

@@ -69,7 +69,7 @@ const ASKED: [Asked; 7] = [
     (
         "driver_activity",
         &[],
-        "0.431034246 0.468913508 0.167420396 0.102323382 -0.182180925 -0.158069811 -0.149880864 -0.130002901 -0.061760722 0.053811967",
+        "0.431034246 0.468913508 0.150846487 0.031681013 -0.072163085 -0.12405208 -0.147067146 -0.410152396 -0.202142301 0.053811967",
     ),
     (
         "running_wide",
@@ -95,6 +95,33 @@ fn laws_ask_as_a_program_from_their_equations_does() {
                 assert!(
                     (asked - wanted).abs() < 1e-8,
                     "{name} at {step}: {asked} {wanted}"
+                );
+            }
+        }
+    }
+}
+
+/// A driver who works against what (9) asks for is left with lambda_min of it and one who works with it has all, whatever of it is
+/// applied: nothing, all, or the opposite.
+#[test]
+fn driver_activity_goes_by_what_equation_9_asks_for() {
+    for sign in [1.0, -1.0] {
+        for guidance_torque_nm in [0.0, 0.25 * sign, -0.25 * sign] {
+            for (driver_nm, least, share) in [(-0.4, 0.0, 0.0), (-0.4, 0.3, 0.3), (0.4, 0.0, 1.0)] {
+                let mut law = law("driver_activity", &[("lambda_min", least)]);
+                let seen = LawView {
+                    e_y_m: 0.5 * sign,
+                    driver_torque_nm: driver_nm * sign,
+                    wheel_rate_rad_per_s: 0.1,
+                    guidance_torque_nm,
+                    ..LawView::default()
+                };
+                let asked = (0..2000).map(|_| law.ask(&seen)).last().unwrap();
+                // K_1*a_1*e_y = 0.25*2*0.5 N.m.
+                let expected = share * 0.25 * sign;
+                assert!(
+                    (asked - expected).abs() < 1e-9,
+                    "{guidance_torque_nm} {driver_nm} {least}: {asked}"
                 );
             }
         }

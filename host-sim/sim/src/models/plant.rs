@@ -290,7 +290,7 @@ impl Plant {
     }
 }
 
-/// Of a small angle.
+/// Sine and cosine of a small angle.
 #[inline]
 fn sine_and_cosine(angle: f64) -> (f64, f64) {
     let square = angle * angle;

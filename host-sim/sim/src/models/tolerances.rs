@@ -75,7 +75,7 @@ impl Draw {
         self.0.random()
     }
 
-    /// Of unit standard deviation, within three of it.
+    /// A normal number of unit standard deviation, within three of it.
     fn normal(&mut self) -> f64 {
         loop {
             let value: f64 = StandardNormal.sample(&mut self.0);

@@ -41,7 +41,7 @@ impl PaperPair {
         Self::moved_by(scenario, scenario.driver(), arm)
     }
 
-    /// The same car with nobody at the wheel: whatever steers it is a hand's torque.
+    /// The car of a scenario with nobody at the wheel: whatever steers it is a hand's torque.
     pub fn without_driver(scenario: &Scenario) -> Self {
         let nobody = DriverParameters {
             a_1: 0.0,

@@ -60,7 +60,7 @@ pub enum ScenarioError {
         speed_kmh: f64,
         /// Look-ahead at that speed, m.
         look_ahead_m: f64,
-        /// The same as time, s.
+        /// Look-ahead time, s.
         look_ahead_s: f64,
     },
 }

@@ -18,7 +18,7 @@ pub enum Condition {
     Mid,
     /// Hardly relying on it.
     Low,
-    /// With other gains than the paper's.
+    /// Other gains than the paper's.
     #[serde(skip_deserializing)]
     Custom,
 }

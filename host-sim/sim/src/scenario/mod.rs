@@ -185,7 +185,7 @@ impl Scenario {
         self.values.gains
     }
 
-    /// The same once a failure is noticed, and the driver drives as manually.
+    /// The gains once a failure is noticed, and the driver drives as manually.
     pub fn manual_gains(&self) -> ArmGains {
         ArmGains {
             k_d: self.values.manual_k_d,

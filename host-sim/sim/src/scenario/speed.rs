@@ -26,7 +26,7 @@ const PLACES_M: RangeInclusive<f64> = 0.0..=1e6;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, try_from = "InFile")]
 pub enum Speed {
-    /// The same all the time, m/s. In a file it is a number at the top.
+    /// One speed all the time, m/s. In a file it is a number at the top.
     #[serde(skip)]
     Constant(f64),
     /// Through points by time.
@@ -87,7 +87,7 @@ fn kmh(m_per_s: f64) -> f64 {
 }
 
 impl Speed {
-    /// The same all the time.
+    /// One speed all the time.
     pub fn constant_kmh(kmh: f64) -> Self {
         Self::Constant(kmh / 3.6)
     }

@@ -29,7 +29,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Of a scenario, for a driver whose points are as far ahead as these times.
+    /// The plan of a scenario, for a driver whose points are as far ahead as these times.
     pub fn new(scenario: &Scenario, driver_s: [f64; 2]) -> Self {
         let guidance = scenario.guidance();
         let [near_s, far_s] = driver_s;

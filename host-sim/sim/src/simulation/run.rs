@@ -119,7 +119,7 @@ pub fn simulate(scenario: &Scenario) -> Run {
     observe(scenario, |_| ())
 }
 
-/// As [`simulate`]; `watch` sees every step.
+/// Simulates a scenario, like [`simulate`]; `watch` sees every step.
 pub fn observe(scenario: &Scenario, watch: impl FnMut(&Outcome)) -> Run {
     // Each kind compiled for itself: a step then chooses nothing.
     match AnyGuidance::new(scenario) {

@@ -17,7 +17,7 @@ pub struct Sensing {
 }
 
 impl Sensing {
-    /// Those of a scenario's car; `None` where they add nothing.
+    /// The sensors of a scenario's car; `None` where they add nothing.
     pub fn new(scenario: &Scenario) -> Option<Box<Self>> {
         let errors = scenario.car().sensor_errors;
         if errors == SensorErrors::default() {

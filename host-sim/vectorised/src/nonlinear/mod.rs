@@ -44,7 +44,7 @@ lanes! {
         assist: f64 = 1.0,
         assist_speed: f64 = 1.0,
         lag: f64 = 1.0,
-        /// Of the motor's torque over what it is told.
+        /// The motor's torque over what it is told.
         gain: f64 = 1.0,
         ripple: f64 = 1.0,
         k_nms: f64 = 1.0,
@@ -63,7 +63,7 @@ lanes! {
         /// Stiffness of each axle, and what it nears where tyres saturate.
         stiffness: [[f64; N]; 2] = [[1.0; N]; 2],
         most: [[f64; N]; 2] = [[1.0; N]; 2],
-        /// Of the runs that have one: its wind, and the bank of its whole road.
+        /// The plants of the runs that have one: its wind, and the bank of its whole road.
         plants: [Option<Box<NonlinearPlant>>; N] = [const { None }; N],
         /// Core's check of a motor that does not deliver what it is told at once.
         motors: [Option<Actuator>; N] = [const { None }; N],

@@ -3,7 +3,7 @@
 use super::{Runs, WHEEL, YAW_RATE};
 use crate::counts::si;
 
-/// Of a camera, in ms: its rhythm, and that of the frames.
+/// The rhythm of a camera and of the frames, ms.
 const CAMERA_MS: u32 = 25;
 const COLUMN_MS: u32 = 2;
 const VEHICLE_MS: u32 = 10;

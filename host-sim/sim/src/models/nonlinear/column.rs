@@ -18,7 +18,7 @@ pub struct SteeringColumn {
 }
 
 impl SteeringColumn {
-    /// With table 9's inertia and damping.
+    /// A column with table 9's inertia and damping.
     pub fn new(vehicle: &VehicleParameters, world: &WorldParameters) -> Self {
         Self {
             inertia: vehicle.j_s,

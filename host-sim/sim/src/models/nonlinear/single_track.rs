@@ -44,7 +44,7 @@ pub struct SingleTrack {
 }
 
 impl SingleTrack {
-    /// With stiffnesses of table 9's kind, per tyre.
+    /// A vehicle with stiffnesses of table 9's kind, per tyre.
     pub fn new(vehicle: &VehicleParameters, tyres: Tyres, castor_share: f64) -> Self {
         let VehicleParameters { m, l_f, l_r, k_f, .. } = *vehicle;
         let weight = m * GRAVITY_M_PER_S2 / (l_f + l_r);

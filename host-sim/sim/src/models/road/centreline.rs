@@ -59,9 +59,9 @@ pub struct Cell {
 pub enum Shape {
     /// Without curvature.
     Straight,
-    /// Of one curvature.
+    /// One curvature all along.
     Arc,
-    /// Of a curvature that changes.
+    /// A curvature that changes.
     Clothoid,
 }
 

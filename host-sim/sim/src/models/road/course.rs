@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Centreline;
 use super::opendrive::{self, LaneChoice, RoadUsed};
-use super::piece::Piece;
+use super::piece::{MAX_COURSE_M, Piece};
 use crate::fields::Field;
 use crate::fields::Range::Between;
 use crate::input::{InputError, RangeError, in_range, parse_toml};
@@ -22,8 +22,6 @@ pub const PAPER_COURSE: &str = "paper-course";
 pub const MAX_CURVATURE_1PM: f64 = 0.1;
 /// Shortest segment, m. Below it a curvature ramp has no meaning on a road.
 const MIN_SEGMENT_M: f64 = 0.01;
-/// Longest course, m: keeps the centreline's table below 20 MB on straights.
-pub(super) const MAX_COURSE_M: f64 = 200_000.0;
 /// Most that a course may turn in all, rad, to and fro: keeps the table below 200 MB in curves.
 const MAX_TURN_RAD: f64 = 5000.0;
 /// Width of a lane unless a course has its own, m: the paper's.
@@ -385,7 +383,7 @@ impl Segment {
         }
     }
 
-    /// The same with a bank (rad, positive where the left edge is the higher one) and a grade (rise per distance),
+    /// The segment with a bank (rad, positive where the left edge is the higher one) and a grade (rise per distance),
     /// each at the start and at the end.
     #[must_use]
     pub fn with_surface(self, bank_rad: [f64; 2], grade: [f64; 2]) -> Self {

@@ -1,4 +1,8 @@
-//! The smallest parts of a road: a place on it, what the surface is like there, and a fine piece of a lane's centre.
+//! The smallest parts of a road: a place on it, what the surface is like there, and a fine piece of a lane's centre; and how
+//! long a road may be.
+
+/// Longest course, m: keeps the centreline's table below 20 MB on straights.
+pub(super) const MAX_COURSE_M: f64 = 200_000.0;
 
 /// A place and a direction in the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -9,7 +9,7 @@ use super::error::{RoadError, refuse};
 use super::polynomial::{CurvePoint, Polynomial};
 use super::xml::{cubic, number, text};
 use crate::models::road::centreline::quadrature;
-use crate::models::road::course::MAX_COURSE_M;
+use crate::models::road::piece::MAX_COURSE_M;
 use crate::models::road::piece::Pose;
 
 /// Elements that may stand beside a kind of geometry and mean nothing for it.

@@ -278,7 +278,7 @@ fn add(sum: &mut [f64; 3], factor: f64, value: [f64; 3]) {
 }
 
 impl Stretch {
-    /// As it is met when it is driven against its s.
+    /// The stretch that is met when this one is driven against its s.
     pub(super) fn reversed(mut self) -> Self {
         let swapped = |[start, end]: [f64; 2], sign: f64| [sign * end, sign * start];
         self.pieces.reverse();

@@ -17,9 +17,9 @@ const LEAST_SECTION_M: f64 = 1e-6;
 pub(super) struct Road<'a> {
     pub(super) id: &'a str,
     pub(super) line: Vec<Geometry>,
-    /// As the road says it.
+    /// The length that the road states.
     pub(super) stated_m: f64,
-    /// As its geometry has it.
+    /// The length that its geometry has.
     pub(super) length_m: f64,
     pub(super) lane_offset: Profile,
     pub(super) superelevation: Profile,

@@ -1,5 +1,8 @@
 //! What this reader needs of an XML element. Names are compared without their namespace, and what is not asked for
 //! is not looked at: a file may carry anything beside the roads.
+//!
+//! The crate `opendrive` (0.1.0) takes files of version 1.7 alone: it knows no crossfall, which those of 1.4 and 1.5 have, and
+//! refuses a file for an attribute that is missing where nobody reads it. It brings uom, chrono and backtrace.
 
 use roxmltree::Node;
 

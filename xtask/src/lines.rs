@@ -1,0 +1,92 @@
+//! How long the code is: lines by crate, and the most that each crate may have.
+//!
+//! Counted are the Rust sources below each place, without blank lines, without comments, and without tests: directories
+//! `tests`, files `tests.rs` and `*_tests.rs`, and what stands below `#[cfg(test)]`, to the closing brace at the same
+//! indentation, as rustfmt leaves it. `cargo xtask lines` prints the table; a test (tests/layering.rs) holds it.
+
+use std::path::Path;
+use std::{fs, io};
+
+/// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
+#[rustfmt::skip]
+pub(crate) const BUDGETS: [(&str, usize); 20] = [
+    ("bench", 400),
+    ("bindings/c", 400),
+    ("bindings/fmu", 1_700),
+    ("bindings/python", 2_300),
+    ("bindings/web", 600),
+    ("core", 7_200),
+    ("examples", 200),
+    ("firmware", 2_700),
+    ("firmware/lockstep", 200),
+    ("host-sim", 3_100),
+    ("host-sim/analysis", 8_700),
+    ("host-sim/batch", 12_400),
+    ("host-sim/campaign", 4_000),
+    ("host-sim/log", 5_400),
+    ("host-sim/pil", 1_900),
+    ("host-sim/report", 6_700),
+    ("host-sim/sim", 8_900),
+    ("host-sim/vectorised", 2_800),
+    ("xtask", 6_400),
+    ("xtask/log", 100),
+];
+
+/// Every crate with its lines and its budget, from the checkout's root.
+pub(crate) fn by_crate(root: &Path) -> io::Result<Vec<(&'static str, usize, usize)>> {
+    let count = |(place, budget)| Ok((place, of_crate(&root.join(place))?, budget));
+    BUDGETS.into_iter().map(count).collect()
+}
+
+/// Lines of code of a crate.
+fn of_crate(place: &Path) -> io::Result<usize> {
+    let mut lines = 0;
+    for entry in fs::read_dir(place)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if path.is_dir() {
+            // A crate within the crate counts for itself.
+            let apart = path.join("Cargo.toml").exists() || matches!(&*name, "tests" | "target");
+            lines += if apart { 0 } else { of_crate(&path)? };
+        } else if name.ends_with(".rs") && name != "tests.rs" && !name.ends_with("_tests.rs") {
+            lines += of_source(&fs::read_to_string(&path)?);
+        }
+    }
+    Ok(lines)
+}
+
+/// Lines of code of a source.
+pub(crate) fn of_source(text: &str) -> usize {
+    let mut lines = 0;
+    // Of a test: how far its attribute is indented.
+    let mut test: Option<usize> = None;
+    for line in text.lines() {
+        let code = line.trim_start();
+        let indent = line.len() - code.len();
+        if code.is_empty() || code.starts_with("//") {
+            continue;
+        }
+        if let Some(at) = test {
+            if indent == at && (code.starts_with('}') || code.ends_with([';', '}'])) {
+                test = None;
+            }
+        } else if code.starts_with("#[cfg(test)]") {
+            test = Some(indent);
+        } else {
+            lines += 1;
+        }
+    }
+    lines
+}
+
+/// Prints the table.
+pub(crate) fn print(root: &Path) -> io::Result<()> {
+    println!("{:<20} {:>7} {:>7}", "crate", "lines", "budget");
+    let crates = by_crate(root)?;
+    for (place, lines, budget) in &crates {
+        println!("{place:<20} {lines:>7} {budget:>7}");
+    }
+    let sum = |of: fn(&(&str, usize, usize)) -> usize| crates.iter().map(of).sum::<usize>();
+    println!("{:<20} {:>7} {:>7}", "all", sum(|c| c.1), sum(|c| c.2));
+    Ok(())
+}
