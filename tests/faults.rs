@@ -143,6 +143,6 @@ fn the_document_has_the_table_of_faults() {
     let text = std::fs::read_to_string(path).expect("docs/reference/fault-campaign.md");
     assert!(
         text.contains(&document::table_of_faults()),
-        "docs/reference/fault-campaign.md is not what `host-sim faults --list` prints"
+        "docs/reference/fault-campaign.md is not what `cargo xtask faults --list` prints"
     );
 }

@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 20] = [
+pub(crate) const BUDGETS: [(&str, usize); 21] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -23,12 +23,13 @@ pub(crate) const BUDGETS: [(&str, usize); 20] = [
     ("host-sim/analysis", 8_700),
     ("host-sim/batch", 11_800),
     ("host-sim/campaign", 4_000),
+    ("host-sim/evidence", 2_400),
     ("host-sim/log", 5_400),
     ("host-sim/pil", 1_900),
     ("host-sim/report", 6_700),
     ("host-sim/sim", 8_900),
     ("host-sim/vectorised", 2_800),
-    ("xtask", 6_400),
+    ("xtask", 6_500),
     ("xtask/log", 100),
 ];
 

@@ -1,4 +1,4 @@
-//! The table of faults in words, as `host-sim faults --list` prints it and `docs/reference/fault-campaign.md` holds it.
+//! The table of faults in words, as `cargo xtask faults --list` prints it and `docs/reference/fault-campaign.md` holds it.
 
 use super::residual::Detectability;
 use super::table::{Expect, FaultCase, GROUPS};

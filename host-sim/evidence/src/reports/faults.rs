@@ -1,15 +1,15 @@
 //! What is shown of a fault campaign: a table, a figure, and runs told one by one.
 
-use super::place;
-use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_campaign::campaign::{Campaign, CaseResult};
 use haptic_campaign::drivers::{Drivers, Limits};
 use haptic_campaign::table::{Class, FaultCase};
 use haptic_campaign::{OFF_ROAD_M, TrialOutcome};
+use haptic_report::document::{Block, Cell, Report, Section, Table};
+use haptic_report::plot::{Axis, Figure, Mark, Panel, Series};
+use haptic_report::studies::place;
 
 /// The document of a campaign, with what the ECU reported in these runs.
-pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
+pub(crate) fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
     let caption = format!(
         "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that they must keep. A fault \
          without a mark on the left has no deadline. The deviation is that from the fault-free run, beside what it is if the torque \
@@ -36,7 +36,7 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
 }
 
 /// What the ECU reported in a run.
-pub fn report_of_run(case: &FaultCase, outcome: TrialOutcome) -> Section {
+pub(crate) fn report_of_run(case: &FaultCase, outcome: TrialOutcome) -> Section {
     let speed = match outcome.change {
         None => format!("{} km/h", outcome.speed_kmh),
         Some(change) => change.to_string(),

@@ -1,17 +1,17 @@
-//! `host-sim validate`: the estimates of `identify` against drivers whose truth is known.
+//! `cargo xtask validate`: the estimates of `identify` against drivers whose truth is known.
 
+use crate::reports::validation::Validation;
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
 use haptic_batch::experiment::{CHANNELS, POPULATION, changes, corruptions, methods, recordings, repeat};
-use haptic_report::studies::validation::Validation;
 
-use super::participants::Drives;
-use super::results::ResultArguments;
-use super::{BadInput, Outcome, progress};
+use host_sim::cli::participants::Drives;
+use host_sim::cli::results::ResultArguments;
+use host_sim::cli::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("question").required(true), mut_arg("probe", |probe| probe.default_value("0.2")))]
-pub(super) struct Arguments {
+pub(crate) struct Arguments {
     /// Drive N times with each participant, and ask whether the 95 % intervals of each parameter hold the truth in 93 to
     /// 97 % of the drives (200 drives tell). Exit code 1 if they do not
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
@@ -43,7 +43,7 @@ pub(super) struct Arguments {
     results: ResultArguments,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let plan = arguments.drives.plan()?;
     let ways = POPULATION
         .iter()

@@ -1,18 +1,18 @@
-//! `host-sim real-drives DIR`: recordings of real people.
+//! `cargo xtask real-drives DIR`: recordings of real people.
 
 use std::path::PathBuf;
 
+use crate::reports::real_drives::report;
 use clap::Args;
 use haptic_analysis::identify::Options;
 use haptic_batch::real_drives::{Understood, real_drives};
-use haptic_report::studies::real_drives::report;
 
-use super::recording::ReadingArguments;
-use super::results::ResultArguments;
-use super::{BadInput, Outcome};
+use host_sim::cli::recording::ReadingArguments;
+use host_sim::cli::results::ResultArguments;
+use host_sim::cli::{BadInput, Outcome};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(crate) struct Arguments {
     /// Directory with recordings that a built-in layout of identify --layout describes, in any depth
     #[arg(value_name = "DIR")]
     directory: PathBuf,
@@ -22,7 +22,7 @@ pub(super) struct Arguments {
     results: ResultArguments,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("real-drives")?;
     let mut options = Options::default();
     arguments.reading.choose(&mut options)?;

@@ -2,15 +2,15 @@
 
 mod hands;
 
-use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::real_drives::{Found, Half, RealDrive, RealDrives, Source};
+use haptic_report::document::{Block, Cell, Report, Section, Table};
+use haptic_report::plot::{Axis, Figure, Panel, Series};
 
 /// Parameters that a torque record can carry.
 const PARAMETERS: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
 
 /// The document of recordings.
-pub fn report(found: &RealDrives) -> Report {
+pub(crate) fn report(found: &RealDrives) -> Report {
     let hands = found.hands.as_ref().map(hands::section);
     let caption = "Every half that was predicted, the best first: the variance of T_d that a driver, or a regression, fitted to the \
                    other half of its drive accounts for. What is below -1 lies at -1: it is worse than that.";

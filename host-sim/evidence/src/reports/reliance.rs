@@ -1,36 +1,14 @@
-//! What the study shows, and the panel of estimate and truth that a single run shares with it.
+//! What the study of the live estimate shows.
 
-use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::reliance::{
-    Accuracy, Example, NEAR, ParticipantResult, REMNANT, Reading, RelianceResults, SETTLING_S,
+    Accuracy, Example, NEAR, ParticipantResult, REMNANT, RelianceResults, SETTLING_S,
 };
+use haptic_report::document::{Block, Cell, Report, Section, Table};
+use haptic_report::plot::{Axis, Figure, Panel};
+use haptic_report::studies::run::reliance_panel;
 
 /// Most examples in the figure.
 const EXAMPLES: usize = 4;
-
-/// The ECU's estimate with two deviations on each side, and the truth: value from an abscissa on. `x` is the
-/// abscissa of a time, s.
-pub(super) fn panel(
-    title: &str,
-    readings: &[Reading],
-    truth: &[(f64, f64)],
-    x: impl Fn(f64) -> f64,
-) -> Panel {
-    // A line breaks where a value is not finite: no estimate, no line.
-    let estimates = || readings.iter().map(|r| r.estimate.unwrap_or([f64::NAN; 2]));
-    let places: Vec<f64> = readings.iter().map(|r| x(r.time_s)).collect();
-    let ends: Vec<[f64; 2]> = estimates()
-        .map(|[k_hg, deviation]| [k_hg - 2.0 * deviation, k_hg + 2.0 * deviation])
-        .collect();
-    let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
-    let series = [
-        Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
-        Series::line("truth", 0, truth.to_vec()),
-        Series::line("estimate", 1, estimate.collect()),
-    ];
-    Panel::new(title, Axis::new("K_hg", "-").within(-0.5, 1.5), series)
-}
 
 /// The errors of all participants together, by time.
 fn pooled_table(results: &RelianceResults) -> Table {
@@ -99,7 +77,7 @@ fn figure(results: &RelianceResults) -> Figure {
 }
 
 /// The study's document. Every drive follows from the published drivers, the probe and the seeds.
-pub fn report(results: &RelianceResults) -> Report {
+pub(crate) fn report(results: &RelianceResults) -> Report {
     let caption = "What the ECU says of K_hg while the driver takes over another's gains.";
     let summary = format!(
         "A probe of {} N.m at {} Hz; drivers of table 6 with a remnant of {} N.m below {} Hz, {} seeds each, on the built-in \
@@ -126,5 +104,5 @@ fn example_panel(example: &Example) -> Panel {
     let end_s = example.readings.last().map_or(time_s, |r| r.time_s);
     let truth = [(0.0, before), (time_s, before), (time_s, after), (end_s, after)];
     let title = format!("Participant {}", example.participant);
-    panel(&title, &example.readings, &truth, |time_s| time_s)
+    reliance_panel(&title, &example.readings, &truth, |time_s| time_s)
 }

@@ -1,10 +1,10 @@
 //! What is shown of how often guidance leaves for nothing: tables and figures.
 
-use super::place;
-use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_campaign::campaign::CaseResult;
+use haptic_report::document::{Block, Cell, Report, Section, Table};
+use haptic_report::plot::{Axis, Figure, Mark, Panel, Series};
+use haptic_report::studies::place;
 use haptic_sim::worlds::{WORLDS, WorldKind};
 use serde::Serialize;
 
@@ -16,21 +16,21 @@ const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wron
 
 /// What is given up for what: false declarations, and faults noticed in the same world.
 #[derive(Debug, Serialize)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Without a fault.
     #[serde(flatten)]
-    pub availability: Availability,
+    pub(crate) availability: Availability,
     /// With every fault by name.
-    pub detection: Option<Detection>,
+    pub(crate) detection: Option<Detection>,
 }
 
 /// Faults in a world.
 #[derive(Debug, Serialize)]
-pub struct Detection {
+pub(crate) struct Detection {
     /// Name of the world.
-    pub world: &'static str,
+    pub(crate) world: &'static str,
     /// Every row of the campaign.
-    pub rows: Vec<CaseResult>,
+    pub(crate) rows: Vec<CaseResult>,
 }
 
 impl Detection {
@@ -89,7 +89,7 @@ fn detection_figure(faults: &Detection) -> Figure {
 }
 
 /// The study's document.
-pub fn report(results: &Balance) -> Report {
+pub(crate) fn report(results: &Balance) -> Report {
     let caption = "False declarations in an hour with their exact 95 % interval; where there was none, the rate that is not exceeded \
                    with 95 % confidence, which is large where little was driven. Beside them the time without guidance: two \
                    seconds of handover and five until the driver asks again.";
@@ -216,7 +216,7 @@ fn drives(results: &Availability) -> Table {
 }
 
 /// What each world has beyond the paper's.
-pub fn worlds() -> Table {
+pub(crate) fn worlds() -> Table {
     let row = |c: &WorldKind| {
         [
             ("World", Cell::text(c.name)),

@@ -2,18 +2,19 @@
 
 use serde::Serialize;
 
-use super::{changes, place};
-use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Panel, Series};
+use super::changes;
 use haptic_batch::experiment::{
     Changes, CorruptionLine, Corruptions, ExperimentPlan, Held, METHODS, MethodLine, Methods, Repeated,
     Repetitions,
 };
+use haptic_report::document::{Block, Cell, Report, Section, Table};
+use haptic_report::plot::{Axis, Figure, Panel, Series};
+use haptic_report::studies::place;
 
 /// One of the five questions that the validation asks, answered.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-pub enum Validation {
+pub(crate) enum Validation {
     /// Do the intervals hold the truth as often as they say?
     Coverage(Repetitions),
     /// Is anything wrong called identified on corrupted logs?
@@ -29,7 +30,7 @@ pub enum Validation {
 
 impl Validation {
     /// What was promised and is not kept.
-    pub fn broken(&self) -> Vec<String> {
+    pub(crate) fn broken(&self) -> Vec<String> {
         match self {
             Self::Coverage(result) => off_coverage(result),
             Self::Corruptions(result) | Self::Recordings(result) => result.broken.clone(),
@@ -93,7 +94,7 @@ impl Validation {
     }
 
     /// The document of the answer. Every drive follows from the published drivers, the probe and the seeds.
-    pub fn report(&self) -> Report {
+    pub(crate) fn report(&self) -> Report {
         let (name, title, caption) = match self {
             Self::Coverage(_) => (
                 "coverage",

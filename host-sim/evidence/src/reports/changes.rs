@@ -2,9 +2,9 @@
 
 use haptic_batch::experiment::{Changes, ChangesLine, Held};
 
-use super::place;
-use crate::document::{Cell, Table};
-use crate::plot::{Axis, Figure, Series};
+use haptic_report::document::{Cell, Table};
+use haptic_report::plot::{Axis, Figure, Series};
+use haptic_report::studies::place;
 
 /// What came out, in a sentence or two.
 pub(super) fn summary(found: &Changes) -> String {

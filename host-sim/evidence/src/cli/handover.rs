@@ -1,15 +1,15 @@
-//! `host-sim handover`.
+//! `cargo xtask handover`.
 
+use crate::reports::handover::report;
 use clap::Args;
 use haptic_batch::handover::{EVERY_S, HandoverRow, drives, study};
-use haptic_report::studies::handover::report;
 
-use super::progress::Threads;
-use super::results::ResultArguments;
-use super::{BadInput, Outcome, progress};
+use host_sim::cli::progress::Threads;
+use host_sim::cli::results::ResultArguments;
+use host_sim::cli::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(crate) struct Arguments {
     /// Spacing of the instants at which the input is lost, 0.05 to 5
     #[arg(long, value_name = "S", default_value_t = EVERY_S, value_parser = seconds)]
     every: f64,
@@ -28,7 +28,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("handover")?;
     let every_s = arguments.every;
     let results = progress::over(drives(every_s) as u64, "drives", |done| {

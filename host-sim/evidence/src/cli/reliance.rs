@@ -1,16 +1,16 @@
-//! `host-sim reliance`.
+//! `cargo xtask reliance`.
 
+use crate::reports::reliance::report;
 use clap::Args;
 use haptic_batch::reliance::{ReliancePlan, study};
-use haptic_report::studies::reliance::report;
 use haptic_sim::input::in_range;
 
-use super::participants::{Participants, check_probe};
-use super::results::ResultArguments;
-use super::{BadInput, Outcome, progress};
+use host_sim::cli::participants::{Participants, check_probe};
+use host_sim::cli::results::ResultArguments;
+use host_sim::cli::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     participants: Participants,
     /// Drives of each participant, each with its own remnant
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     results: ResultArguments,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     in_range("--t-nms", arguments.t_nms, 0.02..=0.5, "s")?;
     check_probe("--amplitude", arguments.amplitude)?;
     let plan = ReliancePlan {

@@ -1,5 +1,6 @@
-//! `host-sim faults`.
+//! `cargo xtask faults`.
 
+use crate::reports::faults::{report, report_of_run};
 use clap::Args;
 use haptic_campaign::campaign;
 use haptic_campaign::drivers::Drivers;
@@ -7,15 +8,14 @@ use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, document, target};
 use haptic_core::controller::params::LAWS;
 use haptic_report::document::write_bytes;
-use haptic_report::studies::faults::{report, report_of_run};
 use haptic_sim::input::did_you_mean;
 use haptic_sim::worlds::WORLDS;
 
-use super::results::ResultArguments;
-use super::{BadInput, Outcome, chosen, print, progress};
+use host_sim::cli::results::ResultArguments;
+use host_sim::cli::{BadInput, Outcome, chosen, print, progress};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(crate) struct Arguments {
     /// Rows to run, by name, separated by commas; default: all that run here
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     rows: Vec<String>,
@@ -28,13 +28,13 @@ pub(super) struct Arguments {
     /// One seed alone, to run a failure again; shows what the ECU reported
     #[arg(long, value_name = "K", conflicts_with_all = ["seeds", "first_seed"])]
     seed: Option<u64>,
-    /// The world to drive in, by name (`host-sim availability --list`); default: the paper's, flat and linear. In any other one
+    /// The world to drive in, by name (`cargo xtask availability --list`); default: the paper's, flat and linear. In any other one
     /// every rule of every cycle must hold, where the vehicle goes is judged, and what is noticed is counted. In `braking` the
     /// vehicle brakes or speeds up by up to 4 m/s2 around each fault
     #[arg(long, value_name = "NAME", conflicts_with = "target")]
     world: Option<String>,
     /// Who drives: `paper`, the drivers of the paper's tables, for its car without friction, or `population`, those of
-    /// `host-sim availability`, who keep the lane in a real one, or `relying`, those of them who rely on the guidance; default: `paper` without --world, `population` with it
+    /// `cargo xtask availability`, who keep the lane in a real one, or `relying`, those of them who rely on the guidance; default: `paper` without --world, `population` with it
     #[arg(long, value_name = "WHO", conflicts_with = "target", value_parser = Drivers::ALL.map(Drivers::name))]
     drivers: Option<String>,
     /// The guidance law on the ECU. The table's limits of torque (2 N.m) and of reaction were chosen for the paper's
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     results: ResultArguments,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.list {
         print(&document::table_of_faults())?;
         return Ok(Outcome::Good);

@@ -1,11 +1,11 @@
 //! What the handover study shows: tables and a figure.
 
-use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::handover::{Bend, Figure as Found, HandoverResults, HandoverRow, RELIANCES, TAKES_OVER_S};
+use haptic_report::document::{Block, Cell, Report, Section, Table};
+use haptic_report::plot::{Axis, Figure, Panel, Series};
 
 /// The study's document.
-pub fn report(results: &HandoverResults) -> Report {
+pub(crate) fn report(results: &HandoverResults) -> Report {
     let (papers, bends) = (of(results, true), of(results, false));
     let caption = "Largest peak of any instant, as a ratio, over the time after which the driver takes over.";
     let summary = format!(

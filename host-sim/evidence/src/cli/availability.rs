@@ -1,21 +1,21 @@
-//! `host-sim availability`.
+//! `cargo xtask availability`.
 
 use std::path::{Path, PathBuf};
 
+use crate::reports::availability::{Balance, Detection, report, worlds};
 use clap::Args;
 use haptic_batch::availability::{AvailabilityPlan, DriveSegment, ROADS, study};
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, campaign};
-use haptic_report::studies::availability::{Balance, Detection, report, worlds};
 use haptic_sim::worlds::WORLDS;
 
-use super::checkpoint::Checkpoint;
-use super::output;
-use super::results::ResultArguments;
-use super::{BadInput, Outcome, chosen, print, progress, width};
+use host_sim::cli::checkpoint::Checkpoint;
+use host_sim::cli::output;
+use host_sim::cli::results::ResultArguments;
+use host_sim::cli::{BadInput, Outcome, chosen, print, progress, width};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(crate) struct Arguments {
     /// Hours in each world on each road, in drives of five minutes
     #[arg(long, value_name = "H", default_value_t = 0.25)]
     hours: f64,
@@ -47,7 +47,7 @@ pub(super) struct Arguments {
     list: bool,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.list {
         print(&worlds().to_text(width()))?;
         return Ok(Outcome::Good);

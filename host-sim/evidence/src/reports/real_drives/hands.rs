@@ -1,8 +1,8 @@
 //! Hands and override on recordings of real people.
 
-use crate::document::{Block, Cell, Table};
-use crate::plot::{Axis, Figure, Series};
 use haptic_batch::real_drives::{End, Ending, Fed, Feed, Hands};
+use haptic_report::document::{Block, Cell, Table};
+use haptic_report::plot::{Axis, Figure, Series};
 
 /// The section's blocks.
 pub(super) fn section(hands: &Hands) -> Vec<Block> {
