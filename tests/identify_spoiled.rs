@@ -5,7 +5,8 @@
 
 use std::sync::LazyLock;
 
-use haptic_batch::experiment::{CorruptionLine, Corruptions, ExperimentPlan, corruptions};
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_evidence::estimates::{CorruptionLine, Corruptions, corruptions};
 
 static FOUND: LazyLock<Corruptions> = LazyLock::new(|| {
     let plan = ExperimentPlan {

@@ -60,7 +60,7 @@ mod record;
 pub mod reliance;
 pub mod run;
 mod shares;
-mod statistics;
+pub mod statistics;
 pub mod study;
 pub mod sweep;
 mod vectorised;

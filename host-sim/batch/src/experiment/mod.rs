@@ -12,29 +12,16 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
-mod changes;
-mod changing;
-mod corruption;
-mod corruptions;
+mod compared;
 mod drives;
-mod kinds;
-mod methods;
 mod recorder;
-mod recordings;
-mod repetitions;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use changes::{Changes, ChangesLine, changes};
-pub use changing::{Changed, DriverChanges, driver_at};
-pub use corruption::{Corruption, POPULATION};
-pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
-pub use kinds::{KINDS, Kind};
-pub use methods::{METHODS, MethodLine, Methods, methods};
+pub use compared::{COMPARED, Compared, compared};
+pub use drives::{Driven, driven, driven_by, guided, log_each, recorded, scenario_of_drive};
 pub use recorder::Recorder;
-pub use recordings::{CHANNELS, Channel, recordings};
-pub use repetitions::{Repeated, Repetitions, repeat};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, TABLE_4, Truth, identify_as_published,
@@ -50,10 +37,7 @@ use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioErro
 use crate::Away;
 use crate::error::StudyError;
 use crate::vectorised::run_all;
-pub use drives::recorded;
-use drives::{Driven, scenario_of_drive};
-pub(crate) use drives::{guided_drive, log_each};
-pub(crate) use repetitions::compared;
+pub(crate) use drives::guided_drive;
 
 /// Standard deviation of the remnant in manual driving, N.m.
 pub const REMNANT_MANUAL_NM: f64 = 0.097;
@@ -76,7 +60,8 @@ pub struct ExperimentPlan {
 
 impl ExperimentPlan {
     /// The drives of a repetition, from 0: other remnants.
-    fn repetition(&self, number: u64) -> Self {
+    #[must_use]
+    pub fn repetition(&self, number: u64) -> Self {
         Self {
             seed: self.seed.wrapping_add(number),
             ..self.clone()
@@ -207,7 +192,10 @@ pub fn experiment(plan: &ExperimentPlan, done: impl Fn() + Sync) -> Result<Exper
 }
 
 /// The participants of these numbers.
-fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, StudyError> {
+///
+/// # Errors
+/// A number that none has.
+pub fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, StudyError> {
     let found = |&number| Ok(participant("participant", number)?);
     numbers.iter().map(found).collect()
 }

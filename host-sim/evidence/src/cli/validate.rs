@@ -3,7 +3,7 @@
 use crate::reports::validation::Validation;
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
-use haptic_batch::experiment::{CHANNELS, POPULATION, changes, corruptions, methods, recordings, repeat};
+use haptic_evidence::estimates::{CHANNELS, POPULATION, changes, corruptions, methods, recordings, repeat};
 
 use host_sim::cli::participants::Drives;
 use host_sim::cli::results::ResultArguments;

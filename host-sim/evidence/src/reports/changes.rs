@@ -1,6 +1,6 @@
 //! What is shown of drivers who change while they drive.
 
-use haptic_batch::experiment::{Changes, ChangesLine, Held};
+use haptic_evidence::estimates::{Changes, ChangesLine, Held};
 
 use haptic_report::document::{Cell, Table};
 use haptic_report::plot::{Axis, Figure, Series};

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::changes;
-use haptic_batch::experiment::{
-    Changes, CorruptionLine, Corruptions, ExperimentPlan, Held, METHODS, MethodLine, Methods, Repeated,
-    Repetitions,
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_evidence::estimates::{
+    Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
 };
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Panel, Series};

@@ -8,12 +8,13 @@ use haptic_analysis::identify::{Identification, Options, identify_as_published, 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::ExperimentPlan;
 use super::corruption::{Corruption, POPULATION, corrupted_log};
-use super::drives::{driven, guided};
-use super::repetitions::{COMPARED, bound_of, compared};
-use crate::error::StudyError;
-use crate::statistics::rms;
+use super::repetitions::bound_of;
+use haptic_batch::StudyError;
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_batch::experiment::{COMPARED, compared};
+use haptic_batch::experiment::{driven, guided};
+use haptic_batch::statistics::rms;
 
 /// The ways.
 pub const METHODS: [&str; 4] = ["none", "plain smoother", "default", "published"];
@@ -50,7 +51,7 @@ pub struct Methods {
 /// Identifies `seeds` guided drives of each participant of `plan` in all ways; `done` is called after each drive.
 ///
 /// # Errors
-/// As [`super::experiment`].
+/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
 pub fn methods(plan: &ExperimentPlan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
     let jobs = guided(plan, seeds)?;
     let noises: Vec<(&'static str, &[Corruption])> = POPULATION

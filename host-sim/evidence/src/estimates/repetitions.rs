@@ -5,16 +5,12 @@
 
 use serde::Serialize;
 
-use super::drives::{guided, log_each, scenario_of_drive};
-use super::{ExperimentPlan, PublishedDriver, truth_of};
-use crate::error::StudyError;
-use crate::statistics::{mean, rms};
-use haptic_analysis::identify::{
-    DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
-};
-
-/// What is compared with the truth: the parameters that a torque record can carry.
-pub(crate) const COMPARED: usize = 5;
+use haptic_analysis::identify::{DriveLog, Identification, Options, identify_with_noise_model, information};
+use haptic_batch::StudyError;
+use haptic_batch::experiment::{COMPARED, Compared, ExperimentPlan, compared, truth_of};
+use haptic_batch::experiment::{guided, log_each, scenario_of_drive};
+use haptic_batch::statistics::{mean, rms};
+use haptic_sim::participants::PublishedDriver;
 
 /// What the repetitions found.
 #[derive(Debug, Clone, Serialize)]
@@ -62,7 +58,7 @@ pub struct Repeated {
 /// any thread.
 ///
 /// # Errors
-/// As [`super::experiment`].
+/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
 pub fn repeat(
     plan: &ExperimentPlan,
     repetitions: u32,
@@ -134,20 +130,6 @@ pub(super) fn bound_of(log: &DriveLog, truth: &PublishedDriver) -> [f64; COMPARE
     let least = information(log, &Options::default(), &truth_of(truth));
     let [gain_1, gain_2, gain_3, k_hg, t_p, _] = least.standard_errors(true);
     [gain_1, gain_2, gain_3, t_p, k_hg]
-}
-
-/// A parameter's key, what was found, and the truth.
-pub(crate) type Compared = (&'static str, Parameter, f64);
-
-pub(crate) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
-    let sum = truth.k_d + Muscle::default().k_nms;
-    [
-        ("gain_1", found.gain_1, sum * truth.a_1),
-        ("gain_2", found.gain_2, sum * truth.a_2),
-        ("gain_3", found.gain_3, sum * truth.a_3),
-        ("t_p", found.t_p, truth.t_p),
-        ("k_hg", found.k_hg, truth.k_hg.unwrap_or(0.0)),
-    ]
 }
 
 impl Repeated {

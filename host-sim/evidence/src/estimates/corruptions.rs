@@ -13,11 +13,13 @@ use serde::Serialize;
 
 use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
-use super::drives::{driven_by, guided};
-use super::repetitions::{COMPARED, Compared, bound_of, compared};
-use super::{ExperimentPlan, PublishedDriver};
-use crate::error::StudyError;
-use crate::statistics::rms;
+use super::repetitions::bound_of;
+use haptic_batch::StudyError;
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_batch::experiment::{COMPARED, Compared, compared};
+use haptic_batch::experiment::{driven_by, guided};
+use haptic_batch::statistics::rms;
+use haptic_sim::participants::PublishedDriver;
 
 /// How many 95 % intervals of identified values hold the truth.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -112,7 +114,7 @@ pub struct Corruptions {
 /// `only`, and identifies each; `done` is called after each, from any thread.
 ///
 /// # Errors
-/// As [`super::experiment`].
+/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
 pub fn corruptions(
     plan: &ExperimentPlan,
     seeds: u32,

@@ -13,13 +13,13 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::ExperimentPlan;
 use super::changing::{Changed, driver_at};
 use super::corruptions::{Held, tolerance};
-use super::drives::guided;
 use super::kinds::{ASSUMED_NOT_TO, Drawn, KINDS};
-use super::repetitions::{COMPARED, compared};
-use crate::error::{StudyError, refuse};
+use haptic_batch::StudyError;
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_batch::experiment::guided;
+use haptic_batch::experiment::{COMPARED, compared};
 
 /// What was made of one kind of change.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -68,7 +68,7 @@ pub struct Changes {
 /// and in pieces where that is refuted; `done` is called after each, from any thread.
 ///
 /// # Errors
-/// As [`super::experiment`].
+/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
 pub fn changes(
     plan: &ExperimentPlan,
     drives: u32,
@@ -78,7 +78,7 @@ pub fn changes(
     let kinds: Vec<_> = KINDS.iter().filter(|(name, _)| name.contains(only)).collect();
     if kinds.is_empty() {
         let names = KINDS.map(|k| k.0).join("; ");
-        return refuse(format!("--only {only:?}: none of {names}"));
+        return Err(StudyError::Asked(format!("--only {only:?}: none of {names}")));
     }
     let jobs = guided(plan, drives)?;
     let found = jobs

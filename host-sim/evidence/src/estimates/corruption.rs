@@ -5,9 +5,9 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
-use super::ExperimentPlan;
-use super::PublishedDriver;
 use super::kinds::{Drawn, Kind};
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_sim::participants::PublishedDriver;
 
 /// One way to corrupt a log.
 #[derive(Debug, Clone, Copy, PartialEq)]

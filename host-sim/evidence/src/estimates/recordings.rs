@@ -16,11 +16,11 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 
-use super::ExperimentPlan;
 use super::corruptions::{CorruptionLine, Corruptions, Held};
-use super::drives::{guided, scenario_of_drive};
-use super::repetitions::{COMPARED, Compared, compared};
-use crate::error::StudyError;
+use haptic_batch::StudyError;
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_batch::experiment::{COMPARED, Compared, compared};
+use haptic_batch::experiment::{guided, scenario_of_drive};
 
 /// How a drive is recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +98,7 @@ pub const CHANNELS: [(&str, Channel); 9] = [
 /// information bound is given for them.
 ///
 /// # Errors
-/// As [`super::experiment`].
+/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
 pub fn recordings(
     plan: &ExperimentPlan,
     seeds: u32,

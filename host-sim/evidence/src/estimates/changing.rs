@@ -8,7 +8,7 @@ use haptic_sim::participants::PublishedDriver;
 use haptic_sim::scenario::{Scenario, ScenarioError};
 use haptic_sim::simulation::Simulation;
 
-use super::Recorder;
+use haptic_batch::experiment::Recorder;
 
 /// Steps of 1 ms from one value of a drift to the next.
 const DRIFT_STEPS: u32 = 100;
@@ -110,8 +110,8 @@ pub(super) fn driven_changing(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::drives::scenario_of_drive;
-    use crate::experiment::{ExperimentPlan, chosen};
+    use haptic_batch::experiment::scenario_of_drive;
+    use haptic_batch::experiment::{ExperimentPlan, chosen};
 
     /// A driver who changes to what he is leaves the log of one who does not; one who changes leaves the same log up to there.
     #[test]

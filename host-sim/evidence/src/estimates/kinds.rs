@@ -6,9 +6,10 @@ use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use super::changing::{Changed, DriverChanges, driven_changing};
-use super::drives::scenario_of_drive;
-use super::{ExperimentPlan, PublishedDriver};
-use crate::error::StudyError;
+use haptic_batch::StudyError;
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_batch::experiment::scenario_of_drive;
+use haptic_sim::participants::PublishedDriver;
 
 /// What changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
