@@ -8,7 +8,6 @@
 //! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
-//! - [`real_drives`]: recordings of real people, half against half.
 //! - [`run`]: one scenario.
 //! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
@@ -55,7 +54,6 @@ pub mod handover;
 pub mod identify;
 #[cfg(feature = "parquet")]
 mod parquet;
-pub mod real_drives;
 mod record;
 pub mod reliance;
 pub mod run;

@@ -21,11 +21,11 @@ use haptic_log::formats::{self, Format, Reading};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::error::{StudyError, refuse};
 use fed::fed;
 pub use fed::{End, Ending, Fed, Feed};
 use hands::Felt;
 pub use hands::Hands;
+use haptic_batch::StudyError;
 use linear::linear;
 pub use reading::Understood;
 use reading::collect;
@@ -35,6 +35,11 @@ use rows::Rows;
 const SHIFTS: usize = 99;
 /// Fewest rows of a half that is judged: 4 s at 10 Hz.
 const LEAST_ROWS: usize = 40;
+
+/// Refuses what was asked for, in a sentence.
+fn refuse<T>(sentence: impl Into<String>) -> Result<T, StudyError> {
+    Err(StudyError::Asked(sentence.into()))
+}
 
 /// All recordings below a directory.
 #[derive(Debug, Clone, Serialize)]

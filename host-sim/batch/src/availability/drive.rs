@@ -27,7 +27,7 @@ const ASKS_EVERY_MS: u32 = 1000;
 const LOW_MS: u32 = 100;
 
 /// In place of faults where the ECU named none.
-pub(crate) const UNNAMED: &str = "none named";
+pub const UNNAMED: &str = "none named";
 
 /// Drives segments, side by side where that can be, both with guidance and by hand; `done` gets each with its place, in no order. A run
 /// that is vectorised with guidance is one in which the ECU leaves nothing.
@@ -149,11 +149,12 @@ fn run_of(samples: Vec<Sample>, ending: Option<Ending>, steps: u32) -> Run {
 }
 
 /// Driver, host and listener of a segment.
-pub(crate) struct Watch {
+pub struct Watch {
     receiver: ReceiverState,
-    pub(crate) reported: Reported,
+    /// What the ECU did so far.
+    pub reported: Reported,
     /// The last frame of the ECU.
-    pub(crate) said: Option<GuidanceMessage>,
+    pub said: Option<GuidanceMessage>,
     faults: FaultSet,
     /// Steps since guidance left; none while it is there.
     away: Option<u32>,
@@ -163,13 +164,13 @@ pub(crate) struct Watch {
 }
 
 /// What the ECU did in a segment.
-pub(crate) struct Reported {
+pub struct Reported {
     /// At its end.
-    pub(crate) mode: Mode,
+    pub mode: Mode,
     /// Steps with guidance.
-    pub(crate) active: u32,
+    pub active: u32,
     /// What took guidance away.
-    pub(crate) declarations: Vec<Declaration>,
+    pub declarations: Vec<Declaration>,
 }
 
 impl Reported {
@@ -183,7 +184,10 @@ impl Reported {
 }
 
 impl Watch {
-    pub(crate) fn new() -> Self {
+    /// Before the first step: guidance is there, and nothing was said.
+    #[must_use]
+    #[allow(clippy::new_without_default, reason = "a watch begins, it is not empty")]
+    pub fn new() -> Self {
         Self {
             receiver: ReceiverState::TRUSTED,
             said: None,
@@ -204,7 +208,7 @@ impl Watch {
     }
 
     /// Whether guidance is asked for.
-    pub(crate) fn engages(&self) -> bool {
+    pub fn engages(&self) -> bool {
         match self.away {
             None => true,
             // A handover goes on while the request stays.
@@ -222,7 +226,7 @@ impl Watch {
     }
 
     /// Takes the guidance frame of a step.
-    pub(crate) fn take_frame(&mut self, time_s: f64, frame: Option<&Frame>) {
+    pub fn take_frame(&mut self, time_s: f64, frame: Option<&Frame>) {
         self.steps += 1;
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {

@@ -24,7 +24,7 @@ use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-pub(crate) use drive::{UNNAMED, Watch};
+pub use drive::{Reported, UNNAMED, Watch};
 pub use roads::{ROADS, Road};
 pub use segment::{ByHand, Declaration, DriveSegment, Ended, SegmentNumber};
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::reports::real_drives::report;
 use clap::Args;
 use haptic_analysis::identify::Options;
-use haptic_batch::real_drives::{Understood, real_drives};
+use haptic_evidence::real_drives::{Understood, real_drives};
 
 use host_sim::cli::recording::ReadingArguments;
 use host_sim::cli::results::ResultArguments;

@@ -18,7 +18,7 @@ use haptic_sim::models::sensors;
 use serde::Serialize;
 
 use super::rows::Rows;
-use crate::availability::{Rate, UNNAMED, Watch};
+use haptic_batch::availability::{Rate, UNNAMED, Watch};
 
 /// Rows further apart are a gap, in which nothing is sent, s.
 const GAP_S: f64 = 0.25;

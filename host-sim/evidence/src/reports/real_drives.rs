@@ -2,7 +2,7 @@
 
 mod hands;
 
-use haptic_batch::real_drives::{Found, Half, RealDrive, RealDrives, Source};
+use haptic_evidence::real_drives::{Found, Half, RealDrive, RealDrives, Source};
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Panel, Series};
 

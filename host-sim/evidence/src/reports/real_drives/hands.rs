@@ -1,6 +1,6 @@
 //! Hands and override on recordings of real people.
 
-use haptic_batch::real_drives::{End, Ending, Fed, Feed, Hands};
+use haptic_evidence::real_drives::{End, Ending, Fed, Feed, Hands};
 use haptic_report::document::{Block, Cell, Table};
 use haptic_report::plot::{Axis, Figure, Series};
 
