@@ -15,7 +15,7 @@ const ASKS_EVERY_MS: u32 = 1000;
 const LOW_MS: u32 = 100;
 
 /// In place of faults where the ECU named none.
-pub(crate) const UNNAMED: &str = "none named";
+pub const UNNAMED: &str = "none named";
 
 /// Guidance left although nothing was wrong.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,27 +30,29 @@ pub struct Declaration {
 }
 
 /// Driver and host, who ask for guidance, and who listens to what the ECU says.
-pub(crate) struct Listener {
+pub struct Listener {
     receiver: ReceiverState,
-    pub(crate) reported: Reported,
+    /// What the ECU did so far.
+    pub reported: Reported,
     /// The last frame of the ECU.
-    pub(crate) said: Option<GuidanceMessage>,
+    pub said: Option<GuidanceMessage>,
     faults: FaultSet,
     /// Steps since guidance left; none while it is there.
     away: Option<u32>,
-    pub(crate) steps: u32,
+    /// Steps so far.
+    pub steps: u32,
     /// Lateral acceleration of the road, left positive.
     lateral_m_per_s2: f64,
 }
 
 /// What the ECU did in a segment.
-pub(crate) struct Reported {
+pub struct Reported {
     /// At its end.
-    pub(crate) mode: Mode,
+    pub mode: Mode,
     /// Steps with guidance.
-    pub(crate) active: u32,
+    pub active: u32,
     /// What took guidance away.
-    pub(crate) declarations: Vec<Declaration>,
+    pub declarations: Vec<Declaration>,
 }
 
 impl Reported {
@@ -64,7 +66,10 @@ impl Reported {
 }
 
 impl Listener {
-    pub(crate) fn new() -> Self {
+    /// Before the first step: guidance is there, and nothing was said.
+    #[must_use]
+    #[allow(clippy::new_without_default, reason = "a listener begins, it is not empty")]
+    pub fn new() -> Self {
         Self {
             receiver: ReceiverState::TRUSTED,
             said: None,
@@ -77,7 +82,7 @@ impl Listener {
     }
 
     /// What driver and host do next.
-    pub(crate) fn action(&self) -> Action {
+    pub fn action(&self) -> Action {
         Action {
             engage: Some(self.engages()),
             ..Action::default()
@@ -85,7 +90,7 @@ impl Listener {
     }
 
     /// Whether guidance is asked for.
-    pub(crate) fn engages(&self) -> bool {
+    pub fn engages(&self) -> bool {
         match self.away {
             None => true,
             // A handover goes on while the request stays.
@@ -94,7 +99,8 @@ impl Listener {
         }
     }
 
-    pub(crate) fn observe(&mut self, outcome: &Outcome) {
+    /// Takes what came of a step.
+    pub fn observe(&mut self, outcome: &Outcome) {
         if let Some(sample) = outcome.sample {
             let v = sample.speed_m_per_s;
             self.lateral_m_per_s2 = sample.curvature_1pm * v * v;
@@ -103,7 +109,7 @@ impl Listener {
     }
 
     /// Takes the guidance frame of a step.
-    pub(crate) fn take_frame(&mut self, time_s: f64, frame: Option<&Frame>) {
+    pub fn take_frame(&mut self, time_s: f64, frame: Option<&Frame>) {
         self.steps += 1;
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {

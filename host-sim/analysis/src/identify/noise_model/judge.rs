@@ -31,7 +31,7 @@ const LEAST_GAIN: f64 = 60.0;
 /// Guidance beyond this, N.m, is no offset of a sensor.
 const GUIDED_NM: f64 = 0.03;
 /// Rows that are further apart do not tell the driver's muscle, whose lag is 0.1 s: at 10 Hz K_hg's optimum is off by three times as
-/// much as at 20 Hz (`host-sim validate --recordings`).
+/// much as at 20 Hz (`cargo xtask validate --recordings`).
 const SLOWEST_S: f64 = 0.055;
 
 /// Where the profile of the delay passes the 95 % level for the first and the last time, or ends below it. Between its points
