@@ -1,6 +1,7 @@
 //! How often guidance leaves for nothing, in small: nothing on paper, and nothing where cameras blink.
 
-use haptic_batch::availability::{AvailabilityPlan, ROADS, study};
+use haptic_batch::availability::{AvailabilityPlan, ROADS};
+use haptic_batch::engine::{Study, Watch};
 use haptic_sim::worlds::WORLDS;
 
 fn drive(world: &str, hours: f64) -> haptic_batch::availability::Availability {
@@ -11,7 +12,7 @@ fn drive(world: &str, hours: f64) -> haptic_batch::availability::Availability {
         seed: 1,
         only: Vec::new(),
     };
-    study(&plan, &[], |_| Ok(())).unwrap()
+    plan.run(&Watch::nobody()).unwrap()
 }
 
 #[test]

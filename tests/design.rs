@@ -1,6 +1,7 @@
 //! Which experiment tells a driver: what `host-sim design` promises is held against drives that were identified.
 
 use haptic_batch::design::{DesignRequest, design};
+use haptic_batch::engine::Watch;
 use haptic_sim::models::road::Course;
 
 fn question() -> DesignRequest {
@@ -20,7 +21,7 @@ fn question() -> DesignRequest {
 /// Twelve fits: their RMS error has a relative standard deviation of 20 %. No unbiased estimator is below the prediction.
 #[test]
 fn the_error_that_is_promised_is_the_one_that_comes() {
-    let answer = design(&question(), || {}).unwrap();
+    let answer = design(&question(), &Watch::nobody()).unwrap();
     let best = &answer.designs[answer.best.unwrap()];
     assert_eq!(best.amplitude_nm, 0.2);
     let c = answer.confirmation.as_ref().unwrap();
@@ -52,7 +53,7 @@ fn what_cannot_be_asked_is_named() {
     let of = |edit: fn(&mut DesignRequest)| {
         let mut question = question();
         edit(&mut question);
-        design(&question, || {}).unwrap_err().to_string()
+        design(&question, &Watch::nobody()).unwrap_err().to_string()
     };
     assert!(of(|q| q.parameter = "k_d".to_owned()).contains("\"k_d\" is unknown"));
     assert!(of(|q| q.participants = vec![15]).contains("participant = 15 is outside 1 to 14"));

@@ -1,5 +1,6 @@
 //! Drivers who change while they drive in closed loop: seen, when, and with what truth in the pieces.
 
+use haptic_batch::engine::Watch;
 use haptic_batch::experiment::{ChangesLine, ExperimentPlan, changes};
 
 fn line(participants: Vec<u32>, drives: u32, kind: &str) -> ChangesLine {
@@ -8,7 +9,7 @@ fn line(participants: Vec<u32>, drives: u32, kind: &str) -> ChangesLine {
         probe_nm: 0.2,
         seed: 40,
     };
-    let [line] = &changes(&plan, drives, kind, || ()).unwrap().lines[..] else {
+    let [line] = &changes(&plan, drives, kind, &Watch::nobody()).unwrap().lines[..] else {
         panic!("{kind}: more than one kind")
     };
     line.clone()

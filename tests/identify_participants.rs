@@ -2,6 +2,7 @@
 //! refuse, and whether its standard errors are right.
 
 use haptic_analysis::identify::{DriveLog, Identification, Options, Parameter, identify_with_noise_model};
+use haptic_batch::engine::Watch;
 use haptic_batch::experiment::{ExperimentPlan, Recorder, experiment, repeat};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::participants::{PublishedDriver, participants};
@@ -91,7 +92,7 @@ fn with_a_probe_k_hg_is_read_and_the_intervals_hold_what_they_promise() {
         probe_nm: 0.2,
         seed: 1,
     };
-    let found = repeat(&plan, 5, || {}).unwrap();
+    let found = repeat(&plan, 5, &Watch::nobody()).unwrap();
     for line in found.participants.iter().filter(|p| p.parameter == "k_hg") {
         assert_eq!(line.identified, 1.0, "{line:?}");
         assert!(line.largest.unwrap() < 0.05, "{line:?}");
@@ -109,7 +110,7 @@ fn without_a_probe_k_hg_is_not_identified() {
         probe_nm: 0.0,
         seed: 1,
     };
-    let found = experiment(&plan, || {}).unwrap();
+    let found = experiment(&plan, &Watch::nobody()).unwrap();
     let (guided, manual): (Vec<_>, Vec<_>) = found.drives.iter().partition(|d| d.guided);
     assert_eq!((guided.len(), manual.len()), (14, 14));
     for drive in &guided {

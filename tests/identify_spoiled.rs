@@ -5,6 +5,7 @@
 
 use std::sync::LazyLock;
 
+use haptic_batch::engine::Watch;
 use haptic_batch::experiment::{CorruptionLine, Corruptions, ExperimentPlan, corruptions};
 
 static FOUND: LazyLock<Corruptions> = LazyLock::new(|| {
@@ -13,7 +14,7 @@ static FOUND: LazyLock<Corruptions> = LazyLock::new(|| {
         probe_nm: 0.2,
         seed: 1,
     };
-    corruptions(&plan, 1, "", || {}).unwrap()
+    corruptions(&plan, 1, "", &Watch::nobody()).unwrap()
 });
 
 fn line(name: &str) -> &'static CorruptionLine {

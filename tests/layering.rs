@@ -55,6 +55,34 @@ const CORE: Arrows = &[
 /// Rooms of core whose modules stand by themselves, and have arrows of their own.
 const APART: [&str; 4] = ["controller", "law", "safety", "service"];
 
+/// The studies of batch, each a module with what is its own. What two of them need belongs to the engine, to the statistics or to
+/// another module that is none of these.
+const STUDIES: &[&str] = &[
+    "adaptation",
+    "availability",
+    "bus_load",
+    "course",
+    "compare",
+    "design",
+    "design_guidance",
+    "evaluate",
+    "experiment",
+    "handover",
+    "identify",
+    "real_drives",
+    "reliance",
+    "run",
+    "stability",
+    "study",
+    "sweep",
+];
+
+/// What only the engine of the studies uses: threads, and runs side by side.
+const ENGINES_OWN: [&str; 2] = ["rayon", "haptic_vectorised"];
+/// Files with runs of two kinds for a case (with the failure and without, with guidance and by hand), which ask the engine's groups for
+/// them; and a step of a run that is recorded.
+const SIDE_BY_SIDE: [&str; 3] = ["availability/drive.rs", "recorder.rs", "sweep/vectorised.rs"];
+
 /// Which of our packages each package of the workspace may depend on, without its tests.
 #[rustfmt::skip]
 const PACKAGES: Arrows = &[
@@ -222,11 +250,13 @@ fn arrows(src: &str) -> BTreeMap<String, BTreeSet<String>> {
     let mut arrows: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for path in &all {
         let place = module(path);
-        if ["lib", "main"].contains(&place[0].as_str()) {
+        if ["lib", "main"].contains(&place[0].as_str()) || path.ends_with("tests.rs") {
             continue;
         }
         let from = part(&place, &modules).unwrap();
         let text = std::fs::read_to_string(path).unwrap();
+        // A module of tests in another file ends nothing.
+        let text = text.replace("#[cfg(test)]\nmod tests;", "");
         let (product, _) = text.split_once("#[cfg(test)]").unwrap_or((&text, ""));
         let used = uses(product, &place);
         let used = used.iter().filter_map(|path| part(path, &modules));
@@ -248,6 +278,39 @@ fn as_written(arrows: Arrows) -> BTreeMap<String, BTreeSet<String>> {
 #[test]
 fn the_core_has_the_arrows_of_its_table_and_no_others() {
     assert_eq!(arrows("core/src"), as_written(CORE));
+}
+
+#[test]
+fn no_study_is_used_by_another_module() {
+    let mut used = arrows("host-sim/batch/src");
+    for study in STUDIES {
+        assert!(
+            used.contains_key(*study) || ["bus_load", "course"].contains(study),
+            "there is no {study}"
+        );
+    }
+    for to in used.values_mut() {
+        to.retain(|to| STUDIES.contains(&to.as_str()));
+    }
+    used.retain(|_, to| !to.is_empty());
+    assert_eq!(used, BTreeMap::new());
+}
+
+#[test]
+fn only_the_engine_of_the_studies_has_threads_and_runs_side_by_side() {
+    let src = root().join("host-sim/batch/src");
+    for path in sources(&src) {
+        let below = path.strip_prefix(&src).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let (product, _) = text
+            .split_once("#[cfg(test)]\nmod tests {")
+            .unwrap_or((&text, ""));
+        let own = tokens(product);
+        let uses = |name: &&&str| own.iter().any(|token| token == **name);
+        let hits: Vec<_> = ENGINES_OWN.iter().filter(uses).collect();
+        let may = below.starts_with("engine") || SIDE_BY_SIDE.contains(&below.to_str().unwrap());
+        assert!(may || hits.is_empty(), "{} uses {hits:?}", path.display());
+    }
 }
 
 /// Cargo refuses what a manifest does not name, so the manifests are the arrows.

@@ -5,6 +5,7 @@
 //! with it, and how closely, is this test's own: peak and mean from the traces, and the tolerances.
 
 use haptic_batch::claims::TABLE;
+use haptic_batch::engine::Watch;
 use haptic_batch::evaluate::{EvaluationResults, evaluate};
 use haptic_core::controller::params::Params;
 use haptic_sim::guidance::{FloatLaw, NoGuidance};
@@ -54,7 +55,7 @@ fn misses(share: f64, floor_m: f64, found: impl Fn(f64, Condition, FailureKind) 
 
 fn shipping(sensors: Sensors) -> EvaluationResults {
     let base = Scenario::builder().sensors(sensors).build().unwrap();
-    let evaluation = evaluate(&base, None, || ()).unwrap();
+    let evaluation = evaluate(&base, None, &Watch::nobody()).unwrap();
     assert_eq!(evaluation.results.runs.len(), 30);
     // The metrics are the ones that this test computes from the traces.
     for ((_, run), record) in evaluation.runs.iter().zip(&evaluation.results.runs) {
@@ -128,5 +129,8 @@ fn the_shipping_controller_over_the_bus_stays_within_ten_percent_and_keeps_the_o
 #[test]
 fn the_claims_speak_of_the_paper_as_it_was_run_only() {
     let base = Scenario::builder().speed_kmh(61.0).build().unwrap();
-    assert_eq!(evaluate(&base, None, || ()).unwrap().results.claims, []);
+    assert_eq!(
+        evaluate(&base, None, &Watch::nobody()).unwrap().results.claims,
+        []
+    );
 }

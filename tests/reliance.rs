@@ -1,6 +1,7 @@
 //! The driver's reliance, read live by the ECU from its probe, against the truth of the driver model. (Whether the
 //! envelope clips the probe is `unclipped`'s question.)
 
+use haptic_batch::engine::Watch;
 use haptic_batch::reliance::{Readings, ReliancePlan, study};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
@@ -17,7 +18,7 @@ fn all_participants_are_read_live() {
         frequency_hz: 2.5,
         t_nms_s: 0.1,
     };
-    let found = study(&plan, || {}).unwrap();
+    let found = study(&plan, &Watch::nobody()).unwrap();
     assert_eq!(found.diverged, 0);
     for (after_s, largest_rms) in [(10.0, 0.085), (30.0, 0.05)] {
         let pooled = found.pooled.iter().find(|a| a.after_s == after_s).unwrap();
@@ -67,7 +68,7 @@ fn another_arm_is_inside_the_stated_deviation() {
             frequency_hz: 2.5,
             t_nms_s,
         };
-        let found = study(&plan, || {}).unwrap();
+        let found = study(&plan, &Watch::nobody()).unwrap();
         for participant in &found.participants {
             let late = participant.accuracy.iter().find(|a| a.after_s == 40.0).unwrap();
             // The mean of four sessions has half of a session's noise.

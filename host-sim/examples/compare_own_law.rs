@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use haptic_batch::compare::{Compare, Kinds};
+use haptic_batch::engine::Watch;
 use haptic_report::studies::compare::report;
 use haptic_sim::kind::{Kind, Make, Parameter};
 use haptic_sim::laws::{Law, LawView};
@@ -43,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     kinds.laws.push(SPRING);
     let file = std::env::args().nth(1).unwrap_or("spring.toml".into());
     let compare = Compare::load(Path::new(&file), &kinds)?;
-    let results = compare.run(|| ())?;
+    let results = compare.run(&Watch::nobody())?;
     println!("{}", report(&results).to_text(None));
     Ok(())
 }

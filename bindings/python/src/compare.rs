@@ -1,9 +1,11 @@
 //! A comparison of laws and drivers, with those of the caller's own.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use haptic_batch::compare::{Compare, CompareResults, Kinds, METRICS, on_threads};
+use haptic_batch::compare::{Compare, CompareResults, Kinds, METRICS};
+use haptic_batch::engine::{Watch, on_threads};
 use haptic_sim::drivers::AnyDriver;
 use haptic_sim::kind::{Kind, Make, Parameter};
 use haptic_sim::laws::{self, Law};
@@ -247,14 +249,13 @@ pub(crate) fn compare<'py>(
     let heard = Arc::clone(&raised);
     let found = interruptible(py, progress, move |progress| {
         let compare = Compare::load(&path, &kinds).map_err(|e| e.to_string())?;
-        let tick = || {
-            progress.tick();
-            if has_raised(&heard) {
-                // Unwinds, without a message: who waits raises what was raised.
-                std::panic::resume_unwind(Box::new("raised"));
-            }
+        let hear = |now| match progress.hear(now) {
+            // Who waits raises what was raised.
+            ControlFlow::Continue(()) if has_raised(&heard) => ControlFlow::Break(()),
+            heard => heard,
         };
-        let results = on_threads(threads, || compare.run(tick)).map_err(|e| e.to_string())?;
+        let watch = Watch::new(&hear);
+        let results = on_threads(threads, || compare.run(&watch)).map_err(|e| e.to_string())?;
         results.map_err(|e| e.to_string())
     });
     let first = raised.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -1,5 +1,6 @@
 //! The paper's participants as drivers with a known truth.
 
+use haptic_batch::engine::Watch;
 use haptic_batch::experiment::{Experiment, ExperimentPlan, experiment as run};
 use haptic_sim::participants::participants as published;
 use haptic_sim::scenario::{GuidanceParameters, Scenario};
@@ -34,8 +35,10 @@ pub(crate) fn experiment<'py>(
         return Err(errors::input(py, "participants: at least one is wanted"));
     }
     check_probe(py, probe_nm)?;
-    let found = interruptible(py, progress, move |progress| run(&plan, || progress.tick()))?
-        .map_err(|error| errors::input(py, error))?;
+    let found = interruptible(py, progress, move |progress| {
+        run(&plan, &Watch::new(&|now| progress.hear(now)))
+    })?
+    .map_err(|error| errors::input(py, error))?;
     let made = PyDict::new(py);
     made.set_item("results", python(py, &found)?)?;
     made.set_item("drives", recorded(py, &found)?)?;

@@ -1,10 +1,12 @@
 //! Long work beside the interpreter: the GIL is free, Ctrl-C ends the call, and a callable hears of progress.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
+use haptic_batch::engine;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 
@@ -19,11 +21,13 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// One more part is done. Work that nobody waits for any more ends here: it unwinds, without a message.
-    pub(crate) fn tick(&self) {
-        self.done.fetch_add(1, Ordering::Relaxed);
+    /// How far the work is. Work that nobody waits for any more is told to end.
+    pub(crate) fn hear(&self, progress: engine::Progress) -> ControlFlow<()> {
+        self.done.store(progress.done as usize, Ordering::Relaxed);
         if self.stop.load(Ordering::Relaxed) {
-            std::panic::resume_unwind(Box::new("interrupted"));
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Whole runs and the paper's evaluation.
 
 use haptic_analysis::metrics::{DEFINITIONS, Window};
+use haptic_batch::engine::Watch;
 use haptic_batch::reliance::Readings;
 use haptic_core::bus::Frame;
 use haptic_log::trace::CHANNELS;
@@ -110,7 +111,7 @@ pub(crate) fn evaluate<'py>(
     let base = scenario.get().inner.clone();
     let window = window_m.map(|[from_m, to_m]| Window { from_m, to_m });
     let evaluation = interruptible(py, progress, move |progress| {
-        haptic_batch::evaluate::evaluate(&base, window, || progress.tick())
+        haptic_batch::evaluate::evaluate(&base, window, &Watch::new(&|now| progress.hear(now)))
     })?
     .map_err(|error| errors::input(py, error))?;
     let made = PyDict::new(py);

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use haptic_batch::VERSION;
 use haptic_batch::sweep::{Shard, Store, Sweep as Inner};
+use haptic_batch::{Confidence, VERSION};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -90,7 +90,7 @@ impl Sweep {
     fn finish<'py>(&self, py: Python<'py>, out: PathBuf) -> PyResult<Bound<'py, PyAny>> {
         let summary = self
             .store(py, &out)?
-            .finish()
+            .finish(Confidence::USUAL)
             .map_err(|error| errors::input(py, error))?;
         python(py, &summary)
     }

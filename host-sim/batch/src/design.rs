@@ -10,11 +10,13 @@
 use haptic_analysis::identify::{DriveLog, INFORMED, Information, Options, identify_together, information};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{PublishedDriver, participant};
-use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::Away;
+use crate::drivers::{Probe, compared, guided_drive, truth_of};
+use crate::engine::{Watch, each, logs};
 use crate::error::{StudyError, refuse};
-use crate::experiment::{Probe, compared, guided_drive, log_each, recorded, truth_of};
+use crate::recorder::recorded;
 use crate::statistics::{mean, rms};
 
 /// The drives, courses and probes to choose from, and the error to reach.
@@ -110,7 +112,7 @@ fn cells(
     request: &DesignRequest,
     drivers: &[(u32, PublishedDriver)],
     probes: &[Option<Probe>],
-    done: impl Fn() + Sync,
+    watch: &Watch<'_>,
 ) -> Result<Vec<Cell>, StudyError> {
     let mut jobs = Vec::new();
     for course in 0..request.courses.len() {
@@ -120,30 +122,30 @@ fn cells(
             }
         }
     }
-    log_each(
+    logs(
         &jobs,
         request.seed,
+        watch,
         |&(course, probe, number, driver)| {
             let seed = request.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
             guided_drive(&driver, Some(&request.courses[course]), probe, seed)
         },
-        |driven, &(course, probe, _, driver)| {
-            done();
-            Cell {
+        |&(course, probe, _, driver), scenario, run, log| {
+            Ok(Cell {
                 course,
                 probe,
-                information: information(&driven.log, &Options::default(), &truth_of(&driver)),
-                left_by_itself: driven.away.is_by_itself(),
-            }
+                information: information(&log, &Options::default(), &truth_of(&driver)),
+                left_by_itself: Away::new(scenario, &run.trace).is_by_itself(),
+            })
         },
     )
 }
 
-/// Computes the designs of `request`; `done` is called after each drive.
+/// Computes the designs of `request`.
 ///
 /// # Errors
 /// An unknown participant or parameter; a course that cannot be driven.
-pub fn design(request: &DesignRequest, done: impl Fn() + Sync) -> Result<DesignResult, StudyError> {
+pub fn design(request: &DesignRequest, watch: &Watch<'_>) -> Result<DesignResult, StudyError> {
     let Some(place) = INFORMED[..5].iter().position(|&n| n == request.parameter) else {
         return refuse(format!(
             "parameter {:?} is unknown, one of {} is wanted",
@@ -153,7 +155,7 @@ pub fn design(request: &DesignRequest, done: impl Fn() + Sync) -> Result<DesignR
     };
     let drivers = drivers(&request.participants)?;
     let probes = probes(request);
-    let cells = cells(request, &drivers, &probes, &done)?;
+    let cells = cells(request, &drivers, &probes, watch)?;
     let forms = forms(request, &probes);
     let mut designs = Vec::new();
     for (course, road) in request.courses.iter().enumerate() {
@@ -170,7 +172,7 @@ pub fn design(request: &DesignRequest, done: impl Fn() + Sync) -> Result<DesignR
         .min_by(|&a, &b| length(&designs[a]).total_cmp(&length(&designs[b])));
     let confirmation = match best {
         Some(best) if request.confirmations > 0 => {
-            Some(confirm(request, place, &designs[best], &drivers, &done)?)
+            Some(confirm(request, place, &designs[best], &drivers, watch)?)
         }
         _ => None,
     };
@@ -181,12 +183,6 @@ pub fn design(request: &DesignRequest, done: impl Fn() + Sync) -> Result<DesignR
         best,
         confirmation,
     })
-}
-
-/// Drives that `design` will call back for.
-pub fn drives(request: &DesignRequest) -> u64 {
-    let each = request.courses.len() * probes(request).len() * request.participants.len();
-    each as u64
 }
 
 fn drivers(numbers: &[u32]) -> Result<Vec<(u32, PublishedDriver)>, StudyError> {
@@ -294,7 +290,7 @@ fn confirm(
     place: usize,
     design: &Design,
     drivers: &[(u32, PublishedDriver)],
-    done: &(impl Fn() + Sync),
+    watch: &Watch<'_>,
 ) -> Result<Confirmation, StudyError> {
     let course = request.courses.iter().find(|c| c.name() == design.course);
     let length_s = design.needed_s.unwrap_or(design.span_s).max(SHORTEST_S);
@@ -306,48 +302,44 @@ fn confirm(
         t_nms_known: request.t_nms_known,
         ..Options::default()
     };
-    let found = jobs
-        .into_par_iter()
-        .map(|(number, driver, repetition)| {
-            let mut logs = Vec::new();
-            let each_s = length_s / design.probes.len() as f64;
-            let mut predicted: Option<Information> = None;
-            for (half, &probe) in design.probes.iter().enumerate() {
-                let mut left_s = each_s;
-                let mut turn = 0;
-                while left_s > 0.0 && turn < 100 {
-                    let seed = 1_000_000
-                        + request.seed.wrapping_mul(10_000)
-                        + u64::from(number) * 101
-                        + repetition * 7919
-                        + (half as u64) * 131
-                        + turn * 17;
-                    let log = recorded(&driver, course, probe, seed)?;
-                    let log = first(log, left_s);
-                    left_s -= log.len() as f64 * log.dt_s;
-                    turn += 1;
-                    let here = information(&log, &Options::default(), &truth_of(&driver));
-                    predicted = Some(predicted.map_or_else(|| here.clone(), |p| p.and(&here)));
-                    logs.push(log);
-                    if left_s < SHORTEST_S {
-                        break;
-                    }
+    let found = each(&jobs, watch, |&(number, driver, repetition)| {
+        let mut logs = Vec::new();
+        let each_s = length_s / design.probes.len() as f64;
+        let mut predicted: Option<Information> = None;
+        for (half, &probe) in design.probes.iter().enumerate() {
+            let mut left_s = each_s;
+            let mut turn = 0;
+            while left_s > 0.0 && turn < 100 {
+                let seed = 1_000_000
+                    + request.seed.wrapping_mul(10_000)
+                    + u64::from(number) * 101
+                    + repetition * 7919
+                    + (half as u64) * 131
+                    + turn * 17;
+                let (_, log) = recorded(&guided_drive(&driver, course, probe, seed)?);
+                let log = first(log, left_s);
+                left_s -= log.len() as f64 * log.dt_s;
+                turn += 1;
+                let here = information(&log, &Options::default(), &truth_of(&driver));
+                predicted = Some(predicted.map_or_else(|| here.clone(), |p| p.and(&here)));
+                logs.push(log);
+                if left_s < SHORTEST_S {
+                    break;
                 }
             }
-            let fit = identify_together(&logs, &options)?;
-            done();
-            let all = compared(&driver, &fit.parameters);
-            let Some((_, p, truth)) = all.into_iter().find(|(key, ..)| *key == request.parameter) else {
-                unreachable!("each parameter of a design is compared")
-            };
-            let promised = predicted.map_or(f64::NAN, |p| p.standard_errors(request.t_nms_known)[place]);
-            let off = p.optimum.map_or(f64::NAN, |x| x - truth);
-            let held = p
-                .interval_95
-                .is_none_or(|[low, high]| low <= truth && truth <= high);
-            Ok((off, held, promised))
-        })
-        .collect::<Result<Vec<_>, StudyError>>()?;
+        }
+        let fit = identify_together(&logs, &options)?;
+        let all = compared(&driver, &fit.parameters);
+        let Some((_, p, truth)) = all.into_iter().find(|(key, ..)| *key == request.parameter) else {
+            unreachable!("each parameter of a design is compared")
+        };
+        let promised = predicted.map_or(f64::NAN, |p| p.standard_errors(request.t_nms_known)[place]);
+        let off = p.optimum.map_or(f64::NAN, |x| x - truth);
+        let held = p
+            .interval_95
+            .is_none_or(|[low, high]| low <= truth && truth <= high);
+        Ok((off, held, promised))
+    })?;
     let count = found.len() as f64;
     Ok(Confirmation {
         fits: found.len(),

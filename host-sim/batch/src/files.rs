@@ -1,10 +1,12 @@
 //! Scenario and course files: the one place where what a person wrote is read from a disk.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use haptic_sim::input::{InputError, in_range};
 use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::scenario::Scenario;
+use toml::{Table, Value};
 
 /// Reads and checks a scenario file. A course file named in it is looked for beside the scenario.
 ///
@@ -105,6 +107,47 @@ impl<'a> Source<'a> {
     pub(crate) fn count(&self, field: &str, value: u64, low: f64, high: f64) -> Result<u32, InputError> {
         self.within(field, value as f64, low, high, "")?;
         Ok(value as u32)
+    }
+}
+
+/// Longest name: it becomes the name of a directory.
+const LONGEST_NAME: usize = 40;
+
+/// Names that files and directories may bear, each once, and one at least.
+pub(crate) fn check_names<'a>(
+    source: &Source,
+    what: &str,
+    names: impl IntoIterator<Item = &'a String>,
+) -> Result<(), InputError> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) {
+            return Err(source.bad(format!(
+                "{what} {name:?}: a name is 1 to {LONGEST_NAME} letters, digits, - and _, for a directory bears it"
+            )));
+        }
+        // Some disks do not tell large letters from small ones.
+        if !seen.insert(name.to_lowercase()) {
+            return Err(source.bad(format!("{what} {name:?} is there twice")));
+        }
+    }
+    if seen.is_empty() {
+        return Err(source.bad(format!("there is no [[{what}]]")));
+    }
+    Ok(())
+}
+
+/// Puts fields over others, tables field by field.
+pub(crate) fn merge(into: &mut Table, over: &Table) {
+    for (name, value) in over {
+        match (into.get_mut(name), value) {
+            // A course is one value.
+            (Some(Value::Table(old)), Value::Table(new)) if name != "course" => merge(old, new),
+            _ => {
+                into.insert(name.clone(), value.clone());
+            }
+        }
     }
 }
 

@@ -1,11 +1,11 @@
 //! One recorded drive, identified: what was found, and on request how the identified driver drives a course.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::RunRecord;
-use super::experiment::identified_driver;
 use super::record::default_window;
+use crate::drivers::identified_driver;
+use crate::engine::{Watch, each};
 use crate::error::StudyError;
 use haptic_analysis::identify::{
     Difference, DriveLog, FixError, Identification, Options, Piece, Pieces, Population, SingleTrack,
@@ -133,26 +133,24 @@ pub struct Drivers {
     pub population: Vec<Population>,
 }
 
-/// Identifies the driver of each log, and compares them; `done` is called after each, from any thread. With `pieces` a driver who
-/// changes is every piece, and the longest one is compared.
+/// Identifies the driver of each log, and compares them. With `pieces` a driver who changes is every piece, and the longest one is
+/// compared.
+///
+/// # Errors
+/// That whoever watches ended it.
 pub fn compare_drivers(
-    logs: Vec<(String, DriveLog)>,
+    logs: &[(String, DriveLog)],
     options: &Options,
     pieces: bool,
-    done: impl Fn() + Sync,
-) -> Drivers {
-    let found: Vec<Vec<(String, Identification)>> = logs
-        .into_par_iter()
-        .map(|(name, log)| {
-            let found = if pieces {
-                in_pieces(&name, &log, options)
-            } else {
-                vec![(name, identify_with_noise_model(&log, options))]
-            };
-            done();
-            found
+    watch: &Watch<'_>,
+) -> Result<Drivers, StudyError> {
+    let found = each(logs, watch, |(name, log)| {
+        Ok(if pieces {
+            in_pieces(name, log, options)
+        } else {
+            vec![(name.clone(), identify_with_noise_model(log, options))]
         })
-        .collect();
+    })?;
     let longest = |of: &'_ Vec<(String, Identification)>| {
         let each = of.iter().enumerate();
         each.max_by_key(|(_, d)| d.1.rows).map_or(0, |(i, _)| i)
@@ -162,11 +160,11 @@ pub fn compare_drivers(
         [first, second] => (differences(first, second), Vec::new()),
         _ => (Vec::new(), population(&fits)),
     };
-    Drivers {
+    Ok(Drivers {
         drivers: found.into_iter().flatten().collect(),
         differences,
         population,
-    }
+    })
 }
 
 /// A driver of each piece; of a drive without one, the whole of it.

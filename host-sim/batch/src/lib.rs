@@ -3,6 +3,7 @@
 //! A study takes scenarios of `haptic-sim`, drives them on every core, measures them with `haptic-analysis`, and gives
 //! one value that is a result: serialisable, without a file or a word for people.
 //!
+//! - [`engine`]: how a study is driven; each of the following is a value for it, or a small program over it.
 //! - [`evaluate`]: section 5 of the paper, three drivers under four conditions, with and without failure.
 //! - [`claims`]: what that evaluation must show.
 //! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
@@ -40,37 +41,42 @@ pub mod adaptation;
 pub mod availability;
 mod away;
 pub mod bus_load;
-pub mod claims;
 pub mod compare;
 pub mod course;
+mod declared;
 pub mod design;
 pub mod design_guidance;
-mod entries;
+mod drivers;
+pub mod engine;
 mod error;
 pub mod evaluate;
-mod evaluation_results;
 pub mod experiment;
 pub mod files;
 pub mod handover;
 pub mod identify;
-#[cfg(feature = "parquet")]
-mod parquet;
+mod metrics;
+pub mod paper;
+mod parts;
+mod places;
+mod readings;
 pub mod real_drives;
 mod record;
+mod recorder;
 pub mod reliance;
 pub mod run;
-mod shares;
+mod sobol;
 mod statistics;
 pub mod study;
 pub mod sweep;
-mod vectorised;
 
 pub mod stability;
 
 pub use away::{Away, left_by_themselves};
+pub use engine::shares;
 pub use error::StudyError;
-pub use record::{RunRecord, check_window};
-pub use shares::shares;
+pub use evaluate::claims;
+pub use record::{RunRecord, check_window, peak_m};
+pub use statistics::{Confidence, Mean, Rate};
 
 /// Version and commit of this program, as results name it.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("HAPTIC_COMMIT"));

@@ -18,9 +18,9 @@ use haptic_analysis::identify::{
     DriveLog, Identification, Layout, Options, Parameter, Recording, identify_with_noise_model, open_mapped,
 };
 use haptic_log::formats::{self, Format, Reading};
-use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::engine::{Watch, each};
 use crate::error::{StudyError, refuse};
 use fed::fed;
 pub use fed::{End, Ending, Fed, Feed};
@@ -115,7 +115,7 @@ pub struct Half {
 ///
 /// # Errors
 /// The directory cannot be read, or holds no recording.
-pub fn real_drives(directory: &Path, how: &Understood) -> Result<RealDrives, StudyError> {
+pub fn real_drives(directory: &Path, how: &Understood, watch: &Watch<'_>) -> Result<RealDrives, StudyError> {
     let layouts = match &how.layout {
         Some(layout) => vec![layout.clone()],
         None => Layout::built_in()?,
@@ -129,10 +129,7 @@ pub fn real_drives(directory: &Path, how: &Understood) -> Result<RealDrives, Stu
             directory.display()
         ));
     }
-    let found: Vec<FileResult<'_>> = files
-        .par_iter()
-        .map(|path| of_file(directory, path, &layouts, how))
-        .collect();
+    let found: Vec<FileResult<'_>> = each(&files, watch, |path| Ok(of_file(directory, path, &layouts, how)))?;
     let mut sources: Vec<Source> = Vec::new();
     for layout in found.iter().filter_map(|file| file.layout) {
         let source = Source {

@@ -5,11 +5,13 @@ use serde::Serialize;
 use super::Away;
 use crate::error::{StudyError, refuse};
 use haptic_analysis::metrics::{self, Circumstances, Metrics, Window};
+use haptic_core::controller::params::Params;
 use haptic_log::trace::Sample;
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
-use haptic_sim::simulation::Run;
+use haptic_sim::simulation::{DIVERGED_M, Run};
+use haptic_sim::stability::{Guided, growth_per_s};
 
 /// A run's line in the results. A metric without a value is `null` in JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -95,6 +97,30 @@ pub(super) fn nominal_peak_m(run: &Run, window: Window, failure_time_s: f64) -> 
     let judged = |s: &&Sample| (s.s_m >= window.from_m || s.time_s >= failure_time_s) && s.s_m <= window.to_m;
     let judged = run.trace.samples.iter().filter(judged);
     judged.map(|s| s.lateral_error_m.abs()).reduce(f64::max)
+}
+
+/// Largest lateral error in a time of a drive, m; of one that left the road 10 m, where runs end.
+pub fn peak_m(run: &Run, [from_s, to_s]: [f64; 2]) -> f64 {
+    if run.diverged() {
+        return DIVERGED_M;
+    }
+    let samples = run.trace.samples.iter();
+    let within = samples.filter(|sample| (from_s..=to_s).contains(&sample.time_s));
+    within
+        .map(|sample| sample.lateral_error_m.abs())
+        .fold(0.0, f64::max)
+}
+
+/// Growth of the slowest motion of a scenario's loop on a straight, 1/s, with a law or by hand: below zero an error dies down.
+pub(crate) fn growth(scenario: &Scenario, law: Option<&Params>) -> f64 {
+    let t_n = scenario.guidance().t_n;
+    growth_per_s(
+        scenario.speed_m_per_s(),
+        &scenario.car().vehicle,
+        scenario.driver(),
+        scenario.gains(),
+        law.map(|law| Guided { law, t_n }),
+    )
 }
 
 /// What a reader of the records has to know of the place of the failure, if the window does not hold it.

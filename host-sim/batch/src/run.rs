@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::RunRecord;
 use super::record::{default_window, failure_notes, nominal_peak_m};
-use super::reliance::Readings;
 use crate::error::StudyError;
+use crate::readings::Readings;
 use haptic_log::Event;
 use haptic_sim::ecu_events::{EcuEvents, Said};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};

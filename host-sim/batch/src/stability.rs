@@ -2,24 +2,23 @@
 //!
 //! Two answers stand side by side. *Growth* is the largest real part of the closed loop's eigenvalues on a straight
 //! (`haptic_sim::stability`): below zero an error dies down. *Peak* is the largest lateral error of a simulated drive with
-//! the shipping ECU through the first curve of the paper's course, stretched with the speed as in [`crate::handover`].
+//! the shipping ECU through the first curve of the paper's course, stretched with the speed.
 //!
 //! A scenario says who guides whom in which car: its law with its schedule, its driver but for the delay and the arm, its
 //! vehicle and world. Speed, delay, arm and road are the map's.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use haptic_core::controller::params::Params;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Scenario};
 use haptic_sim::simulation::Run;
-use haptic_sim::stability::{Guided, growth_per_s};
 
 use crate::Away;
+use crate::engine::{Part, Plan, Study, Watch, each};
 use crate::error::StudyError;
-use crate::handover::{peak_m, stretched_curve};
-use crate::vectorised::run_all;
+use crate::paper::stretched_curve;
+use crate::record::{growth, peak_m};
 
 /// Speeds of the map, km/h.
 pub const SPEEDS_KMH: [f64; 12] = [
@@ -29,9 +28,6 @@ pub const SPEEDS_KMH: [f64; 12] = [
 pub const DELAYS_S: [f64; 5] = [0.1, 0.2, 0.3, 0.4, 0.5];
 /// Shares of the guidance that a schedule may leave at a speed.
 pub const SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// Places of the map.
-pub const PLACES: usize = SPEEDS_KMH.len() * DELAYS_S.len();
-
 /// A place of the map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Place {
@@ -99,39 +95,43 @@ impl Shares {
 /// Growths that differ by less are alike, 1/s.
 const SAME_PER_S: f64 = 0.01;
 
-/// Computes and drives every place on all cores; `progress` is called after each.
-///
-/// # Errors
-/// As [`haptic_sim::scenario::ScenarioBuilder::build`]: a scenario that does not go with some place of the map.
-pub fn map(base: &Scenario, progress: impl Fn() + Sync) -> Result<Vec<Place>, StudyError> {
-    let places: Vec<(f64, f64)> = SPEEDS_KMH
-        .iter()
-        .flat_map(|kmh| DELAYS_S.map(|t_p| (*kmh, t_p)))
-        .collect();
-    let scenarios = places
-        .iter()
-        .flat_map(|(speed_kmh, t_p)| Condition::ALL.map(|condition| at(base, *speed_kmh, *t_p, condition)))
-        .collect::<Result<Vec<_>, _>>()?;
-    let drives = run_all(&scenarios, base.seed(), |number, run| {
-        if number % Condition::ALL.len() == 0 {
-            progress();
-        }
-        Ok(driven(&scenarios[number], run))
-    })?;
-    let of_places = places.iter().zip(drives.chunks(Condition::ALL.len()));
-    Ok(of_places
-        .map(|((speed_kmh, t_p), drives)| Place {
-            speed_kmh: *speed_kmh,
-            t_p: *t_p,
+/// The map of a scenario.
+pub struct Map<'a>(pub &'a Scenario);
+
+impl Study for Map<'_> {
+    type Case = (f64, f64, Condition);
+    type Row = Drive;
+    type Results = Vec<Place>;
+
+    fn plan(&self) -> Result<Plan<Self::Case>, StudyError> {
+        let places = SPEEDS_KMH.iter().flat_map(|kmh| DELAYS_S.map(|t_p| (*kmh, t_p)));
+        let cases = places.flat_map(|(kmh, t_p)| Condition::ALL.map(|condition| (kmh, t_p, condition)));
+        Ok(Plan::side_by_side(cases.collect(), self.0.seed()))
+    }
+
+    fn drive(&self, part: &Part<'_, Self::Case, Drive>) -> Result<Vec<Drive>, StudyError> {
+        part.side_by_side(
+            |(speed_kmh, t_p, condition)| at(self.0, *speed_kmh, *t_p, *condition),
+            |_, scenario, run| Ok(driven(scenario, run)),
+        )
+    }
+
+    fn summarise(&self, cases: Vec<Self::Case>, drives: Vec<Drive>) -> Result<Vec<Place>, StudyError> {
+        let each = Condition::ALL.len();
+        let places = cases.chunks(each).zip(drives.chunks(each));
+        let place = |(cases, drives): (&[Self::Case], &[Drive])| Place {
+            speed_kmh: cases[0].0,
+            t_p: cases[0].1,
             drives: drives.to_vec(),
-        })
-        .collect())
+        };
+        Ok(places.map(place).collect())
+    }
 }
 
 /// What any schedule could do, from the eigenvalues alone.
 ///
 /// # Errors
-/// As [`map`].
+/// A scenario that does not go with some place of the map.
 pub fn shares(base: &Scenario) -> Result<Vec<Shares>, StudyError> {
     let row = |speed_kmh: f64| {
         let mut growth_per_s = [None; SHARES.len()];
@@ -159,7 +159,7 @@ pub fn shares(base: &Scenario) -> Result<Vec<Shares>, StudyError> {
             growth_per_s,
         })
     };
-    SPEEDS_KMH.into_par_iter().map(row).collect()
+    each(&SPEEDS_KMH, &Watch::nobody(), |speed_kmh| row(*speed_kmh))
 }
 
 /// The scenario at a place of the map.
@@ -186,25 +186,13 @@ fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result
     Ok(scenario)
 }
 
-/// Growth of a scenario's loop on a straight, 1/s, with a law or by hand.
-pub(crate) fn growth(scenario: &Scenario, law: Option<&Params>) -> f64 {
-    let t_n = scenario.guidance().t_n;
-    growth_per_s(
-        scenario.speed_m_per_s(),
-        &scenario.car().vehicle,
-        scenario.driver(),
-        scenario.gains(),
-        law.map(|law| Guided { law, t_n }),
-    )
-}
-
 fn driven(scenario: &Scenario, run: &Run) -> Drive {
     let law = &scenario.guidance().controller;
     let condition = scenario.condition();
     Drive {
         condition,
         growth_per_s: growth(scenario, (condition != Condition::Manual).then_some(law)),
-        peak_m: peak_m(run, 0.0),
+        peak_m: (!run.diverged()).then(|| peak_m(run, [0.0, f64::INFINITY])),
         away: Away::new(scenario, &run.trace),
     }
 }
@@ -274,8 +262,11 @@ mod tests {
     fn a_speed_that_changes_has_no_place_on_the_map() {
         let speed = Speed::by_time_kmh(vec![0.0, 10.0], &[60.0, 50.0]);
         let scenario = Scenario::builder().speed(speed).build().unwrap();
-        for error in
-            [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()].map(|e| e.to_string())
+        for error in [
+            Map(&scenario).run(&Watch::nobody()).unwrap_err(),
+            shares(&scenario).unwrap_err(),
+        ]
+        .map(|e| e.to_string())
         {
             assert!(error.starts_with("speed: a map over speeds"), "{error}");
         }

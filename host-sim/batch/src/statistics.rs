@@ -1,12 +1,264 @@
-//! Figures of some values; none of none.
+//! Figures of some values, and intervals that hold what is estimated as often as a level says.
 
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+
+use crate::error::StudyError;
+use haptic_sim::input::in_range;
+use haptic_sim::share::{Z_95, wilson_of};
+
+/// None of none.
 pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut count = 0_usize;
     let sum: f64 = values.into_iter().inspect(|_| count += 1).sum();
     (count > 0).then(|| sum / count as f64)
 }
 
-/// Root of the mean square.
+/// Root of the mean square; none of none.
 pub(crate) fn rms(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     mean(values.into_iter().map(|value| value * value)).map(f64::sqrt)
+}
+
+/// How often an interval holds what is estimated.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct Confidence(f64);
+
+impl Default for Confidence {
+    fn default() -> Self {
+        Self::USUAL
+    }
+}
+
+/// In percent, as words have it: `95`, `99.9`.
+impl std::fmt::Display for Confidence {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // Twelve digits, so that 0.999 is no 99.90000000000001 %.
+        write!(f, "{}", (1e14 * self.0).round() / 1e12)
+    }
+}
+
+impl std::str::FromStr for Confidence {
+    type Err = StudyError;
+
+    fn from_str(text: &str) -> Result<Self, StudyError> {
+        let share = text
+            .parse()
+            .map_err(|_| format!("{text:?} is no number, such as 0.99"))?;
+        Self::new(share)
+    }
+}
+
+impl Confidence {
+    /// 95 %.
+    pub const USUAL: Self = Self(0.95);
+
+    /// A share of 0.5 to 0.9999.
+    ///
+    /// # Errors
+    /// A share outside.
+    pub fn new(share: f64) -> Result<Self, StudyError> {
+        in_range("level", share, 0.5..=0.9999, "")?;
+        Ok(Self(share))
+    }
+
+    /// The share.
+    #[must_use]
+    pub fn share(self) -> f64 {
+        self.0
+    }
+
+    /// What is left out at the upper end, seen from below: 0.975 of 95 %.
+    fn upper(self) -> f64 {
+        0.5 + 0.5 * self.0
+    }
+
+    /// How many standard deviations an interval of a normal distribution reaches.
+    pub(crate) fn normal(self) -> f64 {
+        // The digits of tables, to the last bit as the campaign has them.
+        if self.0 == 0.95 {
+            return Z_95;
+        }
+        Normal::standard().inverse_cdf(self.upper())
+    }
+
+    /// The same of Student's distribution with so many degrees of freedom; infinite with none.
+    pub(crate) fn student(self, freedom: f64) -> f64 {
+        student(self.upper(), freedom)
+    }
+
+    /// Name of an interval's field in JSON: `interval_95`.
+    #[must_use]
+    pub fn field(self) -> String {
+        format!("interval_{self}")
+    }
+
+    /// Whether it is 95 %, of which JSON says nothing more.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
+    pub(crate) fn is_usual(&self) -> bool {
+        *self == Self::USUAL
+    }
+}
+
+impl Serialize for Confidence {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+/// The value below which a share of Student's distribution lies; infinite without a degree of freedom.
+pub(crate) fn student(share: f64, freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |law| law.inverse_cdf(share))
+}
+
+/// A mean with its interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mean {
+    /// The mean.
+    pub mean: f64,
+    /// Student's interval of it; none of a single value.
+    pub interval: Option<[f64; 2]>,
+    /// How often such an interval holds the mean of all.
+    pub level: Confidence,
+}
+
+impl Mean {
+    /// The mean of values that are independent of each other; none of none.
+    #[must_use]
+    pub fn new(values: &[f64], level: Confidence) -> Option<Self> {
+        let mean = mean(values.iter().copied())?;
+        let interval = deviation(values, mean).map(|deviation| {
+            let freedom = values.len() as f64 - 1.0;
+            let margin = level.student(freedom) * deviation / (freedom + 1.0).sqrt();
+            [mean - margin, mean + margin]
+        });
+        Some(Self {
+            mean,
+            interval,
+            level,
+        })
+    }
+}
+
+/// The mean with half its interval, if it has one.
+impl std::fmt::Display for Mean {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.3}", self.mean)?;
+        let Some([low, high]) = self.interval else {
+            return Ok(());
+        };
+        write!(f, " \u{b1} {:.3}", 0.5 * (high - low))
+    }
+}
+
+/// Two fields, whose second has the level in its name.
+impl Serialize for Mean {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_map(Some(2))?;
+        fields.serialize_entry("mean", &self.mean)?;
+        fields.serialize_entry(&self.level.field(), &self.interval)?;
+        fields.end()
+    }
+}
+
+/// Standard deviation about their mean, divisor n - 1; none of fewer than two.
+pub(crate) fn deviation(values: &[f64], mean: f64) -> Option<f64> {
+    let freedom = values.len() as f64 - 1.0;
+    let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (values.len() > 1).then(|| (square / freedom).sqrt())
+}
+
+/// Wilson's interval (1927) of a share of so many observations.
+pub(crate) fn wilson(share: f64, count: f64, level: Confidence) -> [f64; 2] {
+    wilson_of(share, count, level.normal())
+}
+
+/// Counts in a time, and what they say of the rate behind them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Rate {
+    /// Events.
+    pub count: u64,
+    /// Events in an hour.
+    pub per_hour: f64,
+    /// The exact 95 % interval of the rate (Garwood 1936), 1/h.
+    pub interval: [f64; 2],
+    /// The rate that is not exceeded with 95 % confidence, 1/h: for zero events three in the time.
+    pub upper_95: f64,
+}
+
+impl Rate {
+    /// Of so many events of a Poisson process in so many hours.
+    pub fn new(count: u64, hours: f64) -> Self {
+        let quantile = |share: f64, degrees: u64| {
+            let law = ChiSquared::new(degrees as f64).expect("positive");
+            0.5 * quantile(&law, share)
+        };
+        let low = if count == 0 {
+            0.0
+        } else {
+            quantile(0.025, 2 * count)
+        };
+        // In no time nothing is known.
+        let per = |events: f64| if hours > 0.0 { events / hours } else { f64::NAN };
+        Self {
+            count,
+            per_hour: per(count as f64),
+            interval: [per(low), per(quantile(0.975, 2 * count + 2))],
+            upper_95: per(quantile(0.95, 2 * count + 2)),
+        }
+    }
+}
+
+/// By halving: the library's own inverse stops early.
+fn quantile(law: &ChiSquared, share: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    while law.cdf(high) < share {
+        high *= 2.0;
+    }
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if law.cdf(middle) < share {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Student's quantiles as tables print them: 95 % with 4 degrees of freedom 2.776, 99 % 4.604; the normal ones 1.960 and 2.576.
+    #[test]
+    fn an_interval_is_as_wide_as_its_level_says() {
+        let values = [1.0, 2.0, 3.0, 4.0, 5.0];
+        // The standard deviation is the root of 2.5, that of the mean the root of a half.
+        for (share, quantile, normal) in [(0.95, 2.776, 1.960), (0.99, 4.604, 2.576)] {
+            let level = Confidence::new(share).unwrap();
+            let mean = Mean::new(&values, level).unwrap();
+            let [low, high] = mean.interval.unwrap();
+            assert_eq!((mean.mean, mean.level), (3.0, level));
+            for half in [3.0 - low, high - 3.0] {
+                assert!((half - quantile * 0.5_f64.sqrt()).abs() < 1e-3, "{half}");
+            }
+            assert!((level.normal() - normal).abs() < 1e-3);
+        }
+        assert_eq!(Confidence::USUAL.upper(), 0.975);
+        assert!((Z_95 - Normal::standard().inverse_cdf(0.975)).abs() < 1e-9);
+        assert_eq!(Mean::new(&[2.0], Confidence::USUAL).unwrap().interval, None);
+        assert_eq!(Mean::new(&[], Confidence::USUAL), None);
+    }
+
+    #[test]
+    fn a_level_is_said_in_percent_and_bounded() {
+        let said = |text: &str| text.parse::<Confidence>().map(|level| level.to_string());
+        assert_eq!(said("0.999"), Ok("99.9".into()));
+        assert_eq!(said("0.95"), Ok("95".into()));
+        assert!(said("0.9999").is_ok() && said("0.5").is_ok());
+        for text in ["0.4999", "0.99991", "95", "nan", "x"] {
+            assert!(said(text).is_err(), "{text}");
+        }
+    }
 }

@@ -1,10 +1,17 @@
 //! How sure a share is.
 
+/// How many standard deviations an interval of 95 % of a normal distribution reaches.
+pub const Z_95: f64 = 1.959_963_984_540_054;
+
 /// Wilson's interval (1927) of a share of so many observations, 95 %.
 pub fn wilson(share: f64, count: f64) -> [f64; 2] {
-    const Z: f64 = 1.959_963_984_540_054;
-    let (square, whole) = (Z * Z / count, 1.0 + Z * Z / count);
-    let half = Z * (share * (1.0 - share) / count + square / (4.0 * count)).sqrt();
+    wilson_of(share, count, Z_95)
+}
+
+/// Wilson's interval that reaches so many standard deviations.
+pub fn wilson_of(share: f64, count: f64, z: f64) -> [f64; 2] {
+    let (square, whole) = (z * z / count, 1.0 + z * z / count);
+    let half = z * (share * (1.0 - share) / count + square / (4.0 * count)).sqrt();
     [-half, half].map(|half| ((share + 0.5 * square + half) / whole).clamp(0.0, 1.0))
 }
 

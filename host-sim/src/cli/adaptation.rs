@@ -2,6 +2,7 @@
 
 use haptic_batch::adaptation::Adaptation;
 use haptic_batch::compare::Kinds;
+use haptic_batch::engine::Study;
 use haptic_report::document::write_bytes;
 use haptic_report::studies::adaptation::report;
 
@@ -13,11 +14,10 @@ pub(super) const FILE: &str = "Study file (TOML): laws, drivers whose K_hg follo
 
 pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
-    let study = Adaptation::load(&arguments.file, &kinds)?;
+    let mut study = Adaptation::load(&arguments.file, &kinds)?;
+    study.level = arguments.level.level;
     let output = arguments.results.begin("adaptation")?;
-    let results = progress::over(study.drives(), "drives", |done| {
-        arguments.threads.run(|| study.run(done))
-    })??;
+    let results = progress::watched("drives", |watch| arguments.threads.run(|| study.run(watch)))??;
     if let Some(place) = output.place() {
         write_bytes(&place.join("loops.csv"), results.to_csv())?;
     }

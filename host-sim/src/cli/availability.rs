@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use haptic_batch::availability::{AvailabilityPlan, DriveSegment, ROADS, study};
+use haptic_batch::availability::{AvailabilityPlan, DriveSegment, ROADS, resumed};
+use haptic_batch::engine;
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, campaign};
 use haptic_report::studies::availability::{Balance, Detection, report, worlds};
@@ -64,20 +65,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             (Some(checkpoint), segments)
         }
     };
-    let segments = plan.segments();
-    let bar = progress::bar(segments.len() as u64, "drives of five minutes");
-    let known = segments
-        .iter()
-        .filter(|number| on_record.iter().any(|segment| segment.is(number)));
-    bar.inc(known.count() as u64);
-    let results = study(&plan, &on_record, |segment| {
-        bar.inc(1);
-        if let Some(checkpoint) = &checkpoint {
-            checkpoint.add(segment)?;
-        }
-        Ok(())
+    let keep = |segment: &DriveSegment| match &checkpoint {
+        Some(checkpoint) => Ok(checkpoint.add(segment)?),
+        None => Ok(()),
+    };
+    let results = progress::watched("drives of five minutes", |watch| {
+        engine::run(&plan, &resumed(&on_record, keep), watch)
     })?;
-    bar.finish_and_clear();
     let results = Balance {
         detection: detection(&plan, arguments.fault_seeds),
         availability: results,

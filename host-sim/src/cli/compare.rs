@@ -1,7 +1,6 @@
 //! `host-sim compare FILE.toml`.
 
 use haptic_batch::compare::{Compare, Kinds};
-use haptic_report::document::write_bytes;
 use haptic_report::studies::compare::report;
 
 use super::results::StudyFile;
@@ -13,14 +12,14 @@ pub(super) const FILE: &str =
 
 pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
-    let compare = Compare::load(&arguments.file, &kinds)?;
+    let compare = Compare {
+        level: arguments.level.level,
+        ..Compare::load(&arguments.file, &kinds)?
+    };
     let output = arguments.results.begin("compare")?;
-    let results = progress::over(compare.drives(), "drives", |done| {
-        arguments.threads.run(|| compare.run(done))
-    })??;
+    let results = progress::watched("drives", |watch| arguments.threads.run(|| compare.run(watch)))??;
     if let Some(place) = output.place() {
-        write_bytes(&place.join("drives.csv"), results.to_csv())?;
-        results.write_parquet(std::fs::File::create(place.join("drives.parquet"))?)?;
+        results.write_tables(place)?;
     }
     output.show(&report(&results), &results, true)
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::design::{DesignRequest, design, drives};
+use haptic_batch::design::{DesignRequest, design};
 use haptic_report::studies::design::report;
 use haptic_sim::models::road::{Course, LaneChoice};
 
@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         seed: arguments.seed,
     };
     let output = arguments.results.begin("design")?;
-    let answer = progress::over(drives(&question), "drives", |done| design(&question, done))?;
+    let answer = progress::watched("drives", |watch| design(&question, watch))?;
     let best = answer.best.map(|best| &answer.designs[best]);
     let holds = best.is_some_and(|best| best.left_by_itself == 0);
     output.show(&report(&answer), &answer, holds)

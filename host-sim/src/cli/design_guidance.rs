@@ -51,15 +51,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Checkpoint::open::<Evaluated>(&out.join(SETS), &serde_json::to_string(&heading)?)?;
     output::keeps(out, "set")?;
     let output = arguments.results.begin_beside("design-guidance", &[SETS])?;
-    let bar = progress::bar(design.sets(), "sets");
-    bar.inc(known.len() as u64);
-    let results = arguments.threads.run(|| {
-        design.run(&known, |set| {
-            bar.inc(1);
-            Ok(checkpoint.add(set)?)
-        })
+    let keep = |set: &Evaluated| Ok(checkpoint.add(set)?);
+    let results = progress::watched("sets", |watch| {
+        arguments.threads.run(|| design.run(&known, keep, watch))
     })??;
-    bar.finish_and_clear();
     if let Some(place) = output.place() {
         write_bytes(&place.join("chosen.toml"), parameters(&results, chosen))?;
     }

@@ -53,9 +53,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         logs.push((path.display().to_string(), log));
     }
     let output = arguments.results.begin("drivers")?;
-    let drives = logs.len() as u64;
-    let found = progress::over(drives, "drives", |done| {
-        compare_drivers(logs, &options, arguments.pieces, done)
-    });
+    let found = progress::watched("drives", |watch| {
+        compare_drivers(&logs, &options, arguments.pieces, watch)
+    })?;
     output.show(&report(&found), &found, true)
 }

@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use haptic_analysis::metrics::Window;
 use haptic_batch::check_window;
-use haptic_batch::evaluate::{RUNS, evaluate};
+use haptic_batch::evaluate::evaluate;
 use haptic_report::studies::evaluation::{report, write_series};
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
@@ -70,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         check_window(window, &base).map_err(|e| format!("--{e}"))?;
     }
     let output = arguments.results.begin("evaluate")?;
-    let evaluation = progress::over(RUNS as u64, "runs", |done| evaluate(&base, window, done))?;
+    let evaluation = progress::watched("runs", |watch| evaluate(&base, window, watch))?;
     if let Some(place) = output.place() {
         write_series(&evaluation, arguments.series.into(), place)?;
     }

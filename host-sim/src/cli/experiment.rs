@@ -23,8 +23,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let plan = arguments.drives.plan()?;
     let output = arguments.results.begin("experiment")?;
-    let drives = 2 * plan.participants.len() as u64;
-    let result = progress::over(drives, "drives", |done| experiment(&plan, done))?;
+    let result = progress::watched("drives", |watch| experiment(&plan, watch))?;
     if let Some(place) = output.place().filter(|_| arguments.logs) {
         write_logs(&result, &place.join("logs"))?;
     }

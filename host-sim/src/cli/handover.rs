@@ -1,7 +1,8 @@
 //! `host-sim handover`.
 
 use clap::Args;
-use haptic_batch::handover::{EVERY_S, HandoverRow, drives, study};
+use haptic_batch::engine::Study;
+use haptic_batch::handover::{EVERY_S, Handover, HandoverRow};
 use haptic_report::studies::handover::report;
 
 use super::progress::Threads;
@@ -30,10 +31,8 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("handover")?;
-    let every_s = arguments.every;
-    let results = progress::over(drives(every_s) as u64, "drives", |done| {
-        arguments.threads.run(|| study(every_s, done))
-    })??;
+    let study = Handover::new(arguments.every)?;
+    let results = progress::watched("drives", |watch| arguments.threads.run(|| study.run(watch)))??;
     let holds = !results.rows.iter().any(HandoverRow::is_broken);
     output.show(&report(&results), &results, holds)
 }

@@ -3,10 +3,11 @@
 
 use std::fs::File;
 use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use clap::Args;
-use haptic_batch::compare::on_threads;
+use haptic_batch::engine::{Progress, Watch, on_threads};
 use haptic_log::formats::BusLog;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -30,6 +31,19 @@ impl Threads {
 pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {
     let bar = bar(length, unit);
     let done = work(&|| bar.inc(1));
+    bar.finish_and_clear();
+    done
+}
+
+/// Does some work that tells a watch how far it is, under a bar of what it tells.
+pub(super) fn watched<T>(unit: &str, work: impl FnOnce(&Watch<'_>) -> T) -> T {
+    let bar = bar(0, unit);
+    let hear = |progress: Progress| {
+        bar.set_length(progress.all);
+        bar.set_position(progress.done);
+        ControlFlow::Continue(())
+    };
+    let done = work(&Watch::new(&hear));
     bar.finish_and_clear();
     done
 }

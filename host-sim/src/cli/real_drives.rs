@@ -9,7 +9,7 @@ use haptic_report::studies::real_drives::report;
 
 use super::recording::ReadingArguments;
 use super::results::ResultArguments;
-use super::{BadInput, Outcome};
+use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -32,6 +32,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         stretches: options.stretches,
         bridge_s: options.bridge_s,
     };
-    let found = real_drives(&arguments.directory, &how)?;
+    let found = progress::watched("recordings", |watch| {
+        real_drives(&arguments.directory, &how, watch)
+    })?;
     output.show(&report(&found), &found, true)
 }

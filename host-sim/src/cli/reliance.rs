@@ -40,7 +40,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         t_nms_s: arguments.t_nms,
     };
     let output = arguments.results.begin("reliance")?;
-    let drives = plan.participants.len() as u64 * u64::from(plan.seeds);
-    let results = progress::over(drives, "drives", |done| study(&plan, done))?;
+    let results = progress::watched("drives", |watch| study(&plan, watch))?;
     output.show(&report(&results), &results, true)
 }

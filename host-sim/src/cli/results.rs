@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use haptic_batch::Confidence;
 use haptic_report::document::{Report, write_json};
 use serde::Serialize;
 
@@ -23,6 +24,14 @@ pub(super) struct ResultArguments {
     json: bool,
 }
 
+/// How sure intervals are.
+#[derive(Debug, Args)]
+pub(super) struct LevelArgument {
+    /// How often intervals hold what they are of: 0.5 to 0.9999
+    #[arg(long, value_name = "SHARE", default_value = "0.95")]
+    pub(super) level: Confidence,
+}
+
 /// A study's file, and how it is driven.
 #[derive(Debug, Args)]
 pub(super) struct StudyFile {
@@ -30,6 +39,8 @@ pub(super) struct StudyFile {
     pub(super) file: PathBuf,
     #[command(flatten)]
     pub(super) threads: Threads,
+    #[command(flatten)]
+    pub(super) level: LevelArgument,
     #[command(flatten)]
     pub(super) results: ResultArguments,
 }

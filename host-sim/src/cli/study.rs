@@ -7,7 +7,7 @@ use haptic_batch::study::Study;
 use haptic_report::studies::study::{plan, report, write_tables};
 
 use super::recording::ReadingArguments;
-use super::results::ResultArguments;
+use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, output, print, print_notes, progress, width};
 
 const OUT: &str = "Directory of the study: a directory for each session, which is never written again; sessions.csv, results.json, a report. A study that was interrupted goes on where it was";
@@ -27,6 +27,8 @@ pub(super) struct Arguments {
     /// Only check the file, and print who drives what in which order
     #[arg(long, conflicts_with_all = ["import", "json"])]
     dry_run: bool,
+    #[command(flatten)]
+    level: LevelArgument,
     #[command(flatten)]
     results: ResultArguments,
 }
@@ -67,7 +69,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     let out = arguments.results.directory();
     output::check(out, "study", &[])?;
-    let missing = study.missing(out)?.len();
+    // What is another study's is found before anything is imported.
+    study.missing(out)?;
     for import in &arguments.import {
         let fail = |e: String| format!("--import {}: {e}", import.session);
         let imported = match is_plain(&import.file) && !arguments.reading.is_given() {
@@ -83,8 +86,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         imported.map_err(|e| fail(e.to_string()))?;
     }
     output::keeps(out, "session")?;
-    progress::over(missing as u64, "sessions", |done| study.run(out, done))?;
-    let results = study.results(out)?;
+    progress::watched("sessions", |watch| study.run(out, watch))?;
+    let results = study.results(out, arguments.level.level)?;
     let output = arguments.results.begin("study")?;
     if let Some(place) = output.place() {
         write_tables(&results, place)?;

@@ -1,12 +1,14 @@
 //! `host-sim sweep FILE.toml`.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use haptic_batch::VERSION;
-use haptic_batch::sweep::{Progress, Shard, Store, StoreError, Sweep, run_all};
+use haptic_batch::engine::{Progress, Watch};
+use haptic_batch::sweep::{Shard, Store, StoreError, Sweep, run_all};
 use haptic_report::document::{SeriesFormat, write_bytes, write_json};
 use haptic_report::studies::run as run_files;
 use haptic_report::studies::sweep as files;
@@ -15,7 +17,7 @@ use indicatif::ProgressBar;
 
 use super::output::{self, Output};
 use super::progress::{Threads, styled};
-use super::results::ResultArguments;
+use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, print, width};
 
 const OUT: &str = "Directory of the sweep: finished chunks, the table (drives.csv, drives.parquet), summary, figures, report. A sweep that was interrupted goes on where it was";
@@ -43,6 +45,8 @@ pub(super) struct Arguments {
     #[arg(long, conflicts_with = "json")]
     dry_run: bool,
     #[command(flatten)]
+    level: LevelArgument,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
@@ -60,13 +64,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     output::check(out, "sweep", kept(out)).or_else(|_| output::check(out, "sweep", kept(out)))?;
     let store = Store::open(&sweep, VERSION, out)?;
     output::keeps(out, "chunk")?;
-    let threads = arguments.threads.threads;
     let bar = Bar::new();
-    run_all(&store, &sweep, arguments.shard, threads, |progress| {
-        bar.show(progress)
-    })?;
+    let hear = |progress| {
+        bar.show(progress);
+        ControlFlow::Continue(())
+    };
+    let watch = Watch::new(&hear);
+    arguments
+        .threads
+        .run(|| run_all(&store, &sweep, arguments.shard, &watch))??;
     bar.bar.finish_and_clear();
-    let summary = match store.finish() {
+    let summary = match store.finish(arguments.level.level) {
         Ok(summary) => summary,
         Err(error @ StoreError::Missing(..)) if arguments.shard != Shard::WHOLE => {
             eprintln!("This shard is done. {error}.");

@@ -2,7 +2,7 @@
 
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
-use haptic_batch::experiment::{CHANNELS, POPULATION, changes, corruptions, methods, recordings, repeat};
+use haptic_batch::experiment::{POPULATION, changes, corruptions, methods, recordings, repeat};
 use haptic_report::studies::validation::Validation;
 
 use super::participants::Drives;
@@ -45,38 +45,31 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let plan = arguments.drives.plan()?;
-    let ways = POPULATION
-        .iter()
-        .filter(|(name, _)| name.contains(&arguments.only));
-    let ways = ways.count() as u64;
-    if ways == 0 && arguments.changes.is_none() {
+    let is_asked = |name: &str| name.contains(&arguments.only);
+    if !POPULATION.iter().any(|(name, _)| is_asked(name)) && arguments.changes.is_none() {
         let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
         return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
     }
     let output = arguments.results.begin("validate")?;
     let questions = [
-        (arguments.coverage, 1),
-        (arguments.corruptions, ways),
-        (arguments.methods, 1),
-        (arguments.changes, 1),
-        (arguments.recordings, CHANNELS.len() as u64),
+        arguments.coverage,
+        arguments.corruptions,
+        arguments.methods,
+        arguments.changes,
+        arguments.recordings,
     ];
-    let asked = questions
-        .into_iter()
-        .find_map(|(seeds, fits)| Some((seeds?, fits)));
-    let (seeds, fits) = asked.unwrap_or((1, 1));
-    let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
-    let result = progress::over(drives, "drives", |done| -> Result<_, StudyError> {
+    let seeds = questions.into_iter().flatten().next().unwrap_or(1);
+    let result = progress::watched("drives", |watch| -> Result<_, StudyError> {
         Ok(if arguments.coverage.is_some() {
-            Validation::Coverage(repeat(&plan, seeds, done)?)
+            Validation::Coverage(repeat(&plan, seeds, watch)?)
         } else if arguments.corruptions.is_some() {
-            Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, done)?))
+            Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, watch)?))
         } else if arguments.changes.is_some() {
-            Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, done)?))
+            Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, watch)?))
         } else if arguments.recordings.is_some() {
-            Validation::Recordings(Box::new(recordings(&plan, seeds, done)?))
+            Validation::Recordings(Box::new(recordings(&plan, seeds, watch)?))
         } else {
-            Validation::Methods(methods(&plan, seeds, done)?)
+            Validation::Methods(methods(&plan, seeds, watch)?)
         })
     })?;
     let broken = result.broken();

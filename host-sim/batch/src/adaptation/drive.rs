@@ -1,26 +1,28 @@
 //! One drive of a study of two adaptations.
 
-use haptic_sim::guidance::OwnLaw;
+use haptic_sim::Action;
 use haptic_sim::laws::Law as _;
 use haptic_sim::models::STEPS_PER_SECOND;
-use haptic_sim::parts::{Driver as _, PaperVehicle};
-use haptic_sim::scenario::{Failure, FailureKind, ScenarioError};
-use haptic_sim::{Action, Simulation};
+use haptic_sim::parts::Driver as _;
+use haptic_sim::scenario::{Failure, FailureKind};
 
 use super::Adaptation;
-use crate::compare::seed_of;
+use crate::engine::trunk;
+use crate::error::StudyError;
+use crate::places::seed_of;
 
 /// So slowly trust follows where K_hg is held, s: by less than 0.001 in a drive.
 const HELD_S: f64 = 1e6;
 
 /// A drive to be done.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Job {
+pub struct Job {
     pub(super) driver: usize,
     pub(super) seed: u32,
     pub(super) what: What,
 }
 
+/// What is free in a drive.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum What {
     /// At a fixed gain, from a K_hg.
@@ -42,7 +44,7 @@ pub struct Seen {
 
 /// What came of a drive.
 #[derive(Debug, Clone)]
-pub(super) struct Driven {
+pub struct Driven {
     pub(super) series: Vec<Seen>,
     /// Whether it left the road, or the ECU ended guidance by itself.
     pub(super) ended: bool,
@@ -64,7 +66,7 @@ impl Driven {
 }
 
 impl Adaptation<'_> {
-    pub(super) fn drive(&self, job: &Job) -> Result<Driven, ScenarioError> {
+    pub(super) fn driven(&self, job: &Job) -> Result<Driven, StudyError> {
         let (road, speed_kmh, scenario) = &self.place;
         let mut builder =
             scenario
@@ -94,14 +96,9 @@ impl Adaptation<'_> {
         };
         let scenario = builder.build()?;
         let driver = chosen.with_habit("trust", &changed);
-        let driver = driver.make(&scenario, &driver.untuned())?;
+        let driver = driver.untuned_part(&scenario)?;
         let law = law.make(&scenario, &values)?;
-        let mut simulation = Simulation::of_parts(
-            &scenario,
-            driver,
-            PaperVehicle::new(&scenario),
-            OwnLaw::new(&scenario, law),
-        );
+        let mut simulation = trunk(&scenario, law, driver);
         let mut left = false;
         let mut series = Vec::with_capacity(lasts_s as usize);
         let mut sum = Seen::default();

@@ -8,9 +8,10 @@ use serde::Deserialize;
 use toml::Table;
 
 use super::{Adaptation, Times};
-use crate::compare::{Kinds, drives, parts};
-use crate::files::{Source, one};
-use crate::study::check_names;
+use crate::files::{Source, check_names, one};
+use crate::parts::{Kinds, parts};
+use crate::places::drives;
+use crate::statistics::Confidence;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -100,6 +101,7 @@ pub(super) fn from_text<'k>(
         laws,
         drivers,
         fixed,
+        level: Confidence::USUAL,
     })
 }
 

@@ -25,16 +25,15 @@ use haptic_sim::Scenario;
 use haptic_sim::drivers::AnyDriver;
 use haptic_sim::input::InputError;
 use haptic_sim::laws::Law;
-use haptic_sim::scenario::ScenarioError;
-use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::compare::{Chosen, Kinds, Mean};
+use crate::engine::{Part, Plan, Study};
+use crate::error::StudyError;
 use crate::files::Source;
-use crate::statistics::mean;
-use crate::study::interval_of_mean;
-pub use drive::Seen;
-use drive::{Job, What};
+use crate::parts::{Chosen, Kinds};
+use crate::statistics::{Confidence, Mean, mean};
+use drive::What;
+pub use drive::{Driven, Job, Seen};
 pub use linear::{Swing, of_series, steepest, swings};
 
 /// Small gain with a margin of two: the largest product of slopes that a law may have with a driver.
@@ -84,6 +83,8 @@ pub struct Adaptation<'k> {
     drivers: Vec<Chosen<'k, dyn AnyDriver>>,
     /// The paper's law, for the driver's map.
     fixed: Chosen<'k, dyn Law>,
+    /// How often intervals hold what they are of.
+    pub level: Confidence,
 }
 
 /// The driver's map at one fixed gain.
@@ -143,6 +144,9 @@ pub struct AdaptationResults {
     pub place: (String, f64),
     /// Drives of each kind.
     pub seeds: u32,
+    /// How often intervals hold what they are of.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
     /// When the torque is lost, for how long, settling and averaging times, s.
     pub times_s: [f64; 4],
     /// Names of the laws; the first is what the others are held against.
@@ -186,11 +190,6 @@ impl<'k> Adaptation<'k> {
         file::from_text(&source, &text, kinds)
     }
 
-    /// Drives in all.
-    pub fn drives(&self) -> u64 {
-        self.jobs().len() as u64
-    }
-
     /// Every drive: the drivers' maps, then the laws' maps, then the closed loops; the seeds innermost.
     fn jobs(&self) -> Vec<Job> {
         let mut drives = Vec::new();
@@ -213,68 +212,8 @@ impl<'k> Adaptation<'k> {
         (0..self.laws.len() * drivers).map(move |number| (number / drivers, number % drivers))
     }
 
-    /// Drives and sums up, on all cores; `progress` is called after each drive.
-    ///
-    /// # Errors
-    /// As [`haptic_sim::scenario::ScenarioBuilder::build`] for a driver's parameters.
-    pub fn run(&self, progress: impl Fn() + Sync) -> Result<AdaptationResults, ScenarioError> {
-        let jobs = self.jobs();
-        let drive = |job: &Job| {
-            let driven = self.drive(job);
-            progress();
-            driven
-        };
-        let driven: Vec<drive::Driven> = jobs.par_iter().map(drive).collect::<Result<_, _>>()?;
-        let mut groups = driven.chunks(self.seeds as usize);
-        let mut next = || groups.next().unwrap_or_default();
-        let window = [self.times.settles_s, self.times.map_s()];
-        let mut settled = |value: fn(&Seen) -> f64, ended: &mut u32| {
-            let group = next();
-            *ended += group.iter().filter(|drive| drive.ended).count() as u32;
-            mean_of(group.iter().map(|drive| drive.mean(window, value)))
-        };
-        let mut ignored = 0;
-        let maps: Vec<Vec<DriverPoint>> = (self.drivers.iter())
-            .map(|_| {
-                let point = |k_1: &f64| DriverPoint {
-                    k_1: *k_1,
-                    k_hg: [(); 2].map(|()| settled(|seen| seen.k_hg, &mut ignored)),
-                };
-                self.k_1.iter().map(point).collect()
-            })
-            .collect();
-        let law_maps: Vec<(Vec<LawPoint>, u32)> = self
-            .pairs()
-            .map(|_| {
-                let mut ended = 0;
-                let point = |held: &f64| LawPoint {
-                    k_hg: *held,
-                    k_1: settled(|seen| seen.k_1, &mut ended),
-                };
-                (self.k_hg.iter().map(point).collect(), ended)
-            })
-            .collect();
-        let loops: Vec<&[drive::Driven]> = self.pairs().map(|_| next()).collect();
-        let mut pairs = Vec::new();
-        for (((law, driver), (map, ended)), own) in self.pairs().zip(law_maps).zip(&loops) {
-            pairs.push(Pair {
-                law,
-                driver,
-                ended: ended + own.iter().filter(|drive| drive.ended).count() as u32,
-                ..self.pair(own, loops[driver], &maps[driver], map)
-            });
-        }
-        Ok(self.results(maps, pairs))
-    }
-
     /// A law with a driver, of the drives of their loop and of those under the first law.
-    fn pair(
-        &self,
-        own: &[drive::Driven],
-        first: &[drive::Driven],
-        driver: &[DriverPoint],
-        map: Vec<LawPoint>,
-    ) -> Pair {
+    fn pair(&self, own: &[Driven], first: &[Driven], driver: &[DriverPoint], map: Vec<LawPoint>) -> Pair {
         let Times {
             lost_at_s,
             settles_s,
@@ -283,7 +222,7 @@ impl<'k> Adaptation<'k> {
         } = self.times;
         let ends_s = self.times.loop_s();
         let [before, behind] = [[lost_at_s - averages_s, lost_at_s], [ends_s - averages_s, ends_s]];
-        let k_hg = |drive: &drive::Driven, window| drive.mean(window, |seen| seen.k_hg);
+        let k_hg = |drive: &Driven, window| drive.mean(window, |seen| seen.k_hg);
         let points: Vec<(f64, f64)> = (map.iter())
             .filter_map(|point| Some((point.k_hg, point.k_1?.mean)))
             .collect();
@@ -310,15 +249,19 @@ impl<'k> Adaptation<'k> {
             } else {
                 driver_slope.map(|slope| slope * law_slope)
             },
-            k_hg: [before, behind].map(|window| mean_of(own.iter().map(|drive| k_hg(drive, window)))),
-            against_first: mean_of(
+            k_hg: [before, behind].map(|window| self.mean_of(own.iter().map(|drive| k_hg(drive, window)))),
+            against_first: self.mean_of(
                 (own.iter().zip(first)).map(|(own, first)| Some(k_hg(own, behind)? - k_hg(first, behind)?)),
             ),
-            swing_nm: mean_of(swings.iter().map(|swing| Some(swing.deviation))),
+            swing_nm: self.mean_of(swings.iter().map(|swing| Some(swing.deviation))),
             period_s: mean(large.filter_map(|swing| swing.period_s)),
             ended: 0,
             series: own.first().map_or_else(Vec::new, |drive| drive.series.clone()),
         }
+    }
+
+    fn mean_of(&self, values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
+        Mean::new(&values.collect::<Option<Vec<f64>>>()?, self.level)
     }
 
     fn results(&self, maps: Vec<Vec<DriverPoint>>, pairs: Vec<Pair>) -> AdaptationResults {
@@ -332,12 +275,70 @@ impl<'k> Adaptation<'k> {
             name: self.name.clone(),
             place: (self.place.0.clone(), self.place.1),
             seeds: self.seeds,
+            level: self.level,
             times_s: [lost_at_s, lost_for_s, settles_s, averages_s],
             laws: self.laws.iter().map(|law| law.name.clone()).collect(),
             drivers: self.drivers.iter().map(|driver| driver.name.clone()).collect(),
             maps,
             pairs,
         }
+    }
+}
+
+impl Study for Adaptation<'_> {
+    type Case = Job;
+    type Row = Driven;
+    type Results = AdaptationResults;
+
+    fn plan(&self) -> Result<Plan<Job>, StudyError> {
+        Ok(Plan::one_by_one(self.jobs()))
+    }
+
+    fn drive(&self, part: &Part<'_, Job, Driven>) -> Result<Vec<Driven>, StudyError> {
+        part.one_by_one(|job| self.driven(job))
+    }
+
+    fn summarise(&self, _: Vec<Job>, driven: Vec<Driven>) -> Result<AdaptationResults, StudyError> {
+        let mut groups = driven.chunks(self.seeds as usize);
+        let mut next = || groups.next().unwrap_or_default();
+        let window = [self.times.settles_s, self.times.map_s()];
+        let mut settled = |value: fn(&Seen) -> f64, ended: &mut u32| {
+            let group = next();
+            *ended += group.iter().filter(|drive| drive.ended).count() as u32;
+            self.mean_of(group.iter().map(|drive| drive.mean(window, value)))
+        };
+        let mut ignored = 0;
+        let maps: Vec<Vec<DriverPoint>> = (self.drivers.iter())
+            .map(|_| {
+                let point = |k_1: &f64| DriverPoint {
+                    k_1: *k_1,
+                    k_hg: [(); 2].map(|()| settled(|seen| seen.k_hg, &mut ignored)),
+                };
+                self.k_1.iter().map(point).collect()
+            })
+            .collect();
+        let law_maps: Vec<(Vec<LawPoint>, u32)> = self
+            .pairs()
+            .map(|_| {
+                let mut ended = 0;
+                let point = |held: &f64| LawPoint {
+                    k_hg: *held,
+                    k_1: settled(|seen| seen.k_1, &mut ended),
+                };
+                (self.k_hg.iter().map(point).collect(), ended)
+            })
+            .collect();
+        let loops: Vec<&[Driven]> = self.pairs().map(|_| next()).collect();
+        let mut pairs = Vec::new();
+        for (((law, driver), (map, ended)), own) in self.pairs().zip(law_maps).zip(&loops) {
+            pairs.push(Pair {
+                law,
+                driver,
+                ended: ended + own.iter().filter(|drive| drive.ended).count() as u32,
+                ..self.pair(own, loops[driver], &maps[driver], map)
+            });
+        }
+        Ok(self.results(maps, pairs))
     }
 }
 
@@ -356,10 +357,4 @@ fn driver_slope(map: &[DriverPoint], reach: [f64; 2]) -> Option<f64> {
     };
     let two = map.iter().filter(inside).any(apart);
     (!two).then(|| steepest(&branch(0), reach).max(steepest(&branch(1), reach)))
-}
-
-fn mean_of(values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
-    let values: Vec<f64> = values.collect::<Option<_>>()?;
-    let (mean, interval_95) = interval_of_mean(&values)?;
-    Some(Mean { mean, interval_95 })
 }

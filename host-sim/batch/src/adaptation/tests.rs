@@ -8,9 +8,10 @@ use haptic_sim::parts::{Driver as _, PaperVehicle};
 use haptic_sim::{Action, Simulation};
 
 use super::*;
-use crate::compare::{on_threads, seed_of};
+use crate::engine::{Watch, on_threads};
 use crate::files::Source;
 use crate::files::tests::check_refusals;
+use crate::places::seed_of;
 
 /// Equal lags share the phase: three of T swing at a product of 8 with a period of 2*pi*T/sqrt(3), four at 4 with 2*pi*T. One lag never
 /// swings; a delay D alone does at 1 with 2*D.
@@ -90,7 +91,8 @@ fn points(branches: [[f64; 3]; 2]) -> Vec<DriverPoint> {
     let mean = |mean| {
         Some(Mean {
             mean,
-            interval_95: None,
+            interval: None,
+            level: Confidence::USUAL,
         })
     };
     (0..3)
@@ -123,7 +125,7 @@ fn study<'k>(text: &str, kinds: &'k Kinds) -> Result<Adaptation<'k>, InputError>
 fn the_study_s_loop_is_the_simulator_s() {
     let kinds = Kinds::default();
     let study = study(FILE, &kinds).unwrap();
-    let found = study.run(|| ()).unwrap();
+    let found = study.run(&Watch::nobody()).unwrap();
     let (road, kmh, scenario) = &study.place;
     let mut means = [[0.0; 2]; 2];
     for (seed, means) in means.iter_mut().enumerate() {
@@ -163,7 +165,7 @@ fn a_law_s_map_is_its_table_as_the_ecu_estimates_k_hg() {
     let text = FILE
         .replace("settles_s = 10", "settles_s = 40")
         .replace("at_s = 40", "at_s = 60");
-    let found = study(&text, &kinds).unwrap().run(|| ()).unwrap();
+    let found = study(&text, &kinds).unwrap().run(&Watch::nobody()).unwrap();
     let pair = &found.pairs[1];
     for (point, expected) in pair.map.iter().zip([0.322, 0.396]) {
         assert!((point.k_1.unwrap().mean - expected).abs() < 0.02, "{point:?}");
@@ -181,8 +183,8 @@ fn any_number_of_threads_gives_the_same_results() {
     let kinds = Kinds::default();
     let study = study(FILE, &kinds).unwrap();
     // 2 gains from 2 ends, 2 laws at 2 K_hg, 2 loops, each with 2 seeds.
-    assert_eq!(study.drives(), 20);
-    let on = |threads| on_threads(Some(threads), || study.run(|| ()).unwrap()).unwrap();
+    assert_eq!(study.plan().unwrap().cases.len(), 20);
+    let on = |threads| on_threads(Some(threads), || study.run(&Watch::nobody()).unwrap()).unwrap();
     let (one, three) = (on(1), on(3));
     assert_eq!(one, three);
     assert_eq!(one.to_csv(), three.to_csv());

@@ -22,14 +22,14 @@ mod segment;
 
 use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-pub(crate) use drive::{UNNAMED, Watch};
+pub use crate::declared::Declaration;
+pub use crate::statistics::Rate;
 pub use roads::{ROADS, Road};
-pub use segment::{ByHand, Declaration, DriveSegment, Ended, SegmentNumber};
+pub use segment::{ByHand, DriveSegment, Ended, SegmentNumber};
 
+use crate::engine::{Part, Plan, Resumed, Store, Study};
 use crate::error::StudyError;
-use crate::vectorised::in_groups;
 
 /// Length of a segment, s.
 pub const SEGMENT_S: f64 = 300.0;
@@ -53,7 +53,7 @@ pub struct AvailabilityPlan {
 
 impl AvailabilityPlan {
     /// Every segment, in order.
-    pub fn segments(&self) -> Vec<SegmentNumber> {
+    fn segments(&self) -> Vec<SegmentNumber> {
         let segments = (self.hours * 3600.0 / SEGMENT_S - 1e-9).ceil().max(1.0) as u32;
         let numbers = if self.only.is_empty() {
             (0..segments).collect()
@@ -75,64 +75,40 @@ impl AvailabilityPlan {
             })
             .collect()
     }
+}
 
-    /// Whether a segment on record is one of these.
-    fn has(&self, segment: &DriveSegment) -> bool {
-        self.segments().iter().any(|number| segment.is(number))
+/// Segments that an earlier run drove, and what takes each new one.
+pub fn resumed<K>(on_record: &[DriveSegment], keep: K) -> impl Store<SegmentNumber, DriveSegment>
+where
+    K: Fn(&DriveSegment) -> Result<(), StudyError> + Sync,
+{
+    Resumed {
+        rows: on_record,
+        is_of: |number: &SegmentNumber, segment: &DriveSegment| segment.is(number),
+        keep,
     }
 }
 
-/// Counts in a time, and what they say of the rate behind them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rate {
-    /// Events.
-    pub count: u64,
-    /// Events in an hour.
-    pub per_hour: f64,
-    /// The exact 95 % interval of the rate (Garwood 1936), 1/h.
-    pub interval: [f64; 2],
-    /// The rate that is not exceeded with 95 % confidence, 1/h: for zero events three in the time.
-    pub upper_95: f64,
-}
+impl Study for AvailabilityPlan {
+    type Case = SegmentNumber;
+    type Row = DriveSegment;
+    type Results = Availability;
 
-impl Rate {
-    /// Of so many events of a Poisson process in so many hours.
-    pub fn new(count: u64, hours: f64) -> Self {
-        let quantile = |share: f64, degrees: u64| {
-            let law = ChiSquared::new(degrees as f64).expect("positive");
-            0.5 * quantile(&law, share)
-        };
-        let low = if count == 0 {
-            0.0
-        } else {
-            quantile(0.025, 2 * count)
-        };
-        // In no time nothing is known.
-        let per = |events: f64| if hours > 0.0 { events / hours } else { f64::NAN };
-        Self {
-            count,
-            per_hour: per(count as f64),
-            interval: [per(low), per(quantile(0.975, 2 * count + 2))],
-            upper_95: per(quantile(0.95, 2 * count + 2)),
-        }
+    fn plan(&self) -> Result<Plan<SegmentNumber>, StudyError> {
+        Ok(Plan::side_by_side(self.segments(), self.seed))
     }
-}
 
-/// By halving: the library's own inverse stops early.
-fn quantile(law: &ChiSquared, share: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
-    while law.cdf(high) < share {
-        high *= 2.0;
+    fn drive(&self, part: &Part<'_, SegmentNumber, DriveSegment>) -> Result<Vec<DriveSegment>, StudyError> {
+        drive::side_by_side(part, self.seed)
     }
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if law.cdf(middle) < share {
-            low = middle;
-        } else {
-            high = middle;
-        }
+
+    fn summarise(
+        &self,
+        _: Vec<SegmentNumber>,
+        segments: Vec<DriveSegment>,
+    ) -> Result<Availability, StudyError> {
+        Ok(summary(self, &segments.iter().collect::<Vec<_>>()))
     }
-    high
 }
 
 /// What driving in a world on a road showed.
@@ -215,33 +191,6 @@ impl Availability {
         };
         cells.iter().filter(|cell| cell.judged)
     }
-}
-
-/// Drives every segment of the plan that is not yet on record, on every core. `done` gets each new segment, from any thread.
-///
-/// # Errors
-/// A world that is no scenario, the built-in ones are; what `done` says; a drive that differs from the shipping ECU's.
-pub fn study(
-    plan: &AvailabilityPlan,
-    on_record: &[DriveSegment],
-    done: impl Fn(&DriveSegment) -> Result<(), StudyError> + Sync,
-) -> Result<Availability, StudyError> {
-    let missing: Vec<SegmentNumber> = plan
-        .segments()
-        .into_iter()
-        .filter(|number| !on_record.iter().any(|segment| segment.is(number)))
-        .collect();
-    let driven: Vec<DriveSegment> = in_groups(&missing, |first, numbers| {
-        let mut segments: Vec<Option<DriveSegment>> = vec![None; numbers.len()];
-        drive::side_by_side(numbers, plan.seed, [first, missing.len()], |place, segment| {
-            done(&segment)?;
-            segments[place] = Some(segment);
-            Ok(())
-        })?;
-        Ok(segments.into_iter().flatten().collect())
-    })?;
-    let on_record = on_record.iter().filter(|segment| plan.has(segment));
-    Ok(summary(plan, &on_record.chain(&driven).collect::<Vec<_>>()))
 }
 
 fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability {

@@ -10,9 +10,10 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::drive::{Reported, by_hand, with_ecu};
+use super::drive::{by_hand, with_ecu};
 use super::roads::falling_and_rising;
 use super::{CARS, Road, WorldKind};
+use crate::declared::{Declaration, Reported};
 use crate::error::StudyError;
 
 /// Which segment.
@@ -76,18 +77,6 @@ pub enum Ended {
     Latched,
     /// Off the road.
     Diverged,
-}
-
-/// Guidance left although nothing was wrong.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Declaration {
-    /// When, s after the start of the segment.
-    pub time_s: f64,
-    /// The faults that the ECU named, joined by a plus.
-    pub faults: String,
-    /// Lateral acceleration of the road there, m/s2, left positive.
-    pub lateral_m_per_s2: f64,
 }
 
 impl DriveSegment {

@@ -2,6 +2,7 @@ use haptic_sim::scenario::Speed;
 use haptic_sim::worlds::WORLDS;
 
 use super::*;
+use crate::engine::{Watch, run};
 
 /// Exact limits of a Poisson count as tables print them (Garwood 1936; Ulm 1990): 0 to 3.689, 0.0253 to 5.572, 4.795 to
 /// 18.39, 81.36 to 121.63; and three for the one-sided limit of none.
@@ -105,16 +106,20 @@ fn an_interrupted_study_goes_on_where_it_was() {
         driven.lock().unwrap().push(segment.clone());
         Ok(())
     };
-    let whole = study(&plan, &[], keep).unwrap();
+    let drive = |on_record: &[DriveSegment],
+                 keep: &(dyn Fn(&DriveSegment) -> Result<(), StudyError> + Sync)| {
+        run(&plan, &resumed(on_record, keep), &Watch::nobody())
+    };
+    let whole = drive(&[], &keep).unwrap();
     let mut segments = driven.into_inner().unwrap();
     assert_eq!(segments.len(), 2);
     let kept = segments.split_off(1);
     let again = std::sync::Mutex::new(0);
-    let resumed = study(&plan, &kept, |_| {
+    let found = drive(&kept, &|_| {
         *again.lock().unwrap() += 1;
         Ok(())
     });
-    assert_eq!((resumed, again.into_inner().unwrap()), (Ok(whole.clone()), 1));
+    assert_eq!((found, again.into_inner().unwrap()), (Ok(whole.clone()), 1));
 
     // A competent driver: wanders as people do, and stays in a lane of 3.6 m.
     for cell in &whole.cells {
@@ -274,24 +279,29 @@ fn braking_in_a_real_world_is_no_fault() {
 fn legs_are_the_same_side_by_side() {
     for name in ["calibrated", "everything", "camera", "slippery"] {
         let world = WORLDS.iter().find(|world| world.name == name).unwrap();
-        let segments: Vec<SegmentNumber> = (7..9)
-            .zip(&ROADS)
-            .map(|(number, road)| SegmentNumber { world, road, number })
-            .collect();
-        let mut found = vec![None; segments.len()];
-        let keep = |place: usize, segment| {
-            assert_eq!(found[place].replace(segment), None, "{name} {place}");
+        let plan = AvailabilityPlan {
+            worlds: vec![world],
+            roads: ROADS.iter().collect(),
+            only: vec![7],
+            ..plan(1.0)
+        };
+        let found = std::sync::Mutex::new(Vec::new());
+        let keep = |segment: &DriveSegment| {
+            found.lock().unwrap().push(segment.clone());
             Ok(())
         };
-        drive::side_by_side(&segments, 1, [0, segments.len()], keep).unwrap();
-        for (number, segment) in segments.iter().zip(&found) {
+        run(&plan, &resumed(&[], keep), &Watch::nobody()).unwrap();
+        let found = found.into_inner().unwrap();
+        assert_eq!(found.len(), 2, "{name}");
+        for segment in &found {
+            let number = plan
+                .segments()
+                .into_iter()
+                .find(|number| segment.is(number))
+                .unwrap();
             // As the file has it, which tells 0 from -0.
             let text = |segment: &DriveSegment| toml::to_string(segment).unwrap();
-            assert_eq!(
-                text(segment.as_ref().unwrap()),
-                text(&number.drive(1).unwrap()),
-                "{name}"
-            );
+            assert_eq!(text(segment), text(&number.drive(1).unwrap()), "{name}");
         }
     }
 }

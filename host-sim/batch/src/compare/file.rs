@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use haptic_sim::input::{InputError, parse_toml};
-use haptic_sim::scenario::{Condition, FailureKind, Scenario, Speed};
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::drive::METRICS;
-use super::parts::{parts, unknown};
-use super::{Compare, Drives, Faults, Kinds, Tuning};
-use crate::files::{Source, one};
-use crate::study::{check_names, merge};
+use super::{Compare, METRICS, Tuning};
+use crate::engine::Faults;
+use crate::files::{Source, check_names, merge, one};
+use crate::parts::{Kinds, parts, unknown};
+use crate::places::{Drives, drives};
+use crate::statistics::Confidence;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -93,6 +93,7 @@ pub(super) fn from_text<'k>(
         oracles,
         tuning,
         faults,
+        level: Confidence::USUAL,
     };
     check_parts(source, &compare)?;
     Ok(compare)
@@ -189,62 +190,4 @@ fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning
         )?,
         weights,
     })
-}
-
-/// The places of drives: a scenario for each road and speed.
-pub(crate) fn drives(
-    source: &Source,
-    table: &str,
-    fields: &Table,
-    roads: &[String],
-    speeds_m_per_s: &[f64],
-    seeds: u64,
-) -> Result<Drives, InputError> {
-    let seeds = source.count(&format!("{table}seeds"), seeds, 1.0, 1000.0)?;
-    for (field, is_empty) in [
-        ("roads", roads.is_empty()),
-        ("speeds_m_per_s", speeds_m_per_s.is_empty()),
-    ] {
-        if is_empty {
-            return Err(source.bad(format!("{table}{field} = []: one at least is wanted")));
-        }
-    }
-    for field in [
-        "seed",
-        "course",
-        "speed",
-        "speed_m_per_s",
-        "failure",
-        "driver_change",
-    ] {
-        if fields.contains_key(field) {
-            return Err(source.bad(format!(
-                "scenario.{field}: this file has its own seeds, roads, speeds, faults and drivers"
-            )));
-        }
-    }
-    let mut places = Vec::new();
-    for road in roads {
-        let here = format!("{}: {table}roads {road}", source.name);
-        let mut fields = fields.clone();
-        fields.insert("course".into(), Value::String(road.clone()));
-        let scenario = Scenario::from_toml(&here, &fields.to_string(), |course, lane| {
-            source.course(course, lane)
-        })?;
-        if scenario.condition() == Condition::Manual || scenario.failure().kind != FailureKind::None {
-            return Err(source.bad("scenario.condition = \"manual\": a law of kind \"none\" is no guidance"));
-        }
-        let law = scenario.guidance().controller.law;
-        if law != 0.0 {
-            return Err(source.bad(format!(
-                "scenario.guidance.law = {law}: this file has its own laws, which take the place of the ECU's"
-            )));
-        }
-        for speed in speeds_m_per_s {
-            let built = scenario.to_builder().speed(Speed::Constant(*speed)).build();
-            let built = built.map_err(|e| InputError::new(&here, e))?;
-            places.push((road.clone(), built.speed_kmh(), built));
-        }
-    }
-    Ok(Drives { places, seeds })
 }

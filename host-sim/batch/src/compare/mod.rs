@@ -11,7 +11,6 @@
 
 mod drive;
 mod file;
-mod parts;
 mod results;
 #[cfg(test)]
 mod tests;
@@ -19,121 +18,22 @@ mod tune;
 
 use std::path::Path;
 
-use haptic_sim::drivers::{AnyDriver, DRIVERS, HABITS};
+use haptic_sim::drivers::AnyDriver;
 use haptic_sim::input::InputError;
-use haptic_sim::kind::{Kind, Make, Parameter};
-use haptic_sim::laws::{LAWS, Law};
-use haptic_sim::scenario::{Scenario, ScenarioError};
-use haptic_sim::seeds::named;
-use rayon::prelude::*;
-use serde::Deserialize;
+use haptic_sim::laws::Law;
 
+use crate::engine::{Part, Plan, Study, Watch};
+use crate::error::StudyError;
 use crate::files::Source;
+use crate::places::{Drives, seed_of};
+use crate::statistics::Confidence;
 
-pub use drive::{Driven, METRICS, Metric};
-pub(crate) use drive::{failures, measured};
-pub(crate) use file::drives;
-pub(crate) use parts::{parts, unknown};
-pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean, Ratio};
-
-/// The laws, drivers and habits that a file may name.
-pub struct Kinds {
-    /// Laws, and what may be put around one.
-    pub laws: Vec<Kind<dyn Law>>,
-    /// Drivers, and habits.
-    pub drivers: Vec<Kind<dyn AnyDriver>>,
-}
-
-impl Default for Kinds {
-    fn default() -> Self {
-        Self {
-            laws: LAWS.into(),
-            drivers: DRIVERS.into_iter().chain(HABITS).collect(),
-        }
-    }
-}
-
-/// A law or driver of a file.
-pub struct Chosen<'k, P: ?Sized + 'static> {
-    /// Its name in the file.
-    pub name: String,
-    /// What it is.
-    pub kind: &'k Kind<P>,
-    /// The values of its parameters; `None` is the default, which tuning may leave.
-    pub values: Vec<Option<f64>>,
-    /// What is around it, the innermost first, with the values of their parameters.
-    pub around: Vec<(&'k Kind<P>, Vec<f64>)>,
-}
-
-impl<'k, P: ?Sized> Chosen<'k, P> {
-    /// The values of its parameters, untuned.
-    pub fn untuned(&self) -> Vec<f64> {
-        let pairs = self.values.iter().zip(self.kind.parameters);
-        pairs.map(|(value, p)| value.unwrap_or(p.default)).collect()
-    }
-
-    /// Its kind in what is around it.
-    fn kinds(&self) -> String {
-        let around = self.around.iter().map(|(outer, _)| outer.name);
-        around.fold(self.kind.name.to_owned(), |inner, outer| {
-            format!("{outer}({inner})")
-        })
-    }
-
-    /// The same, with other values of some parameters of what is around it.
-    pub(crate) fn with_habit(&self, kind: &str, changed: &[(&str, f64)]) -> Self {
-        let value = |p: &Parameter, value: &f64| {
-            let found = changed.iter().find(|(name, _)| *name == p.name);
-            found.map_or(*value, |(_, value)| *value)
-        };
-        let outer = |(outer, values): &(&'k Kind<P>, Vec<f64>)| {
-            let values = outer.parameters.iter().zip(values);
-            let all = values.map(|(p, old)| if outer.name == kind { value(p, old) } else { *old });
-            (*outer, all.collect())
-        };
-        Self {
-            name: self.name.clone(),
-            kind: self.kind,
-            values: self.values.clone(),
-            around: self.around.iter().map(outer).collect(),
-        }
-    }
-
-    /// As it is made untuned; refused in words that name it as the file does.
-    pub(crate) fn check(
-        &self,
-        what: &str,
-        source: &Source,
-        scenario: &Scenario,
-    ) -> Result<Box<P>, InputError> {
-        let made = self.make(scenario, &self.untuned());
-        made.map_err(|e| source.bad(format!("{what} {}: {e}", self.name)))
-    }
-
-    pub(crate) fn make(&self, scenario: &Scenario, values: &[f64]) -> Result<Box<P>, ScenarioError> {
-        let mut made = match self.kind.make {
-            Make::Part(make) => make(scenario, values)?,
-            Make::Given(make) => make(scenario, values)?,
-            // The file was checked: what goes around another one is in `around`.
-            Make::Around(_) => unreachable!("{} is made around another one", self.kind.name),
-        };
-        for (kind, values) in &self.around {
-            if let Make::Around(make) = kind.make {
-                made = make(scenario, values, made);
-            }
-        }
-        Ok(made)
-    }
-}
-
-/// The drives of a law with a driver: each road at each speed with each seed.
-#[derive(Debug, Clone)]
-pub struct Drives {
-    /// A scenario for each road and speed, with what to call them.
-    pub places: Vec<(String, f64, Scenario)>,
-    /// Drives at each place.
-    pub seeds: u32,
-}
+pub use crate::engine::{Faults, on_threads};
+pub use crate::metrics::{METRICS, Metric};
+pub use crate::parts::{Chosen, Kinds};
+pub use crate::statistics::Mean;
+pub use drive::Driven;
+pub use results::{Cell, CompareResults, DriveRow, LawResult, Ratio};
 
 /// How laws are tuned.
 #[derive(Debug, Clone)]
@@ -144,28 +44,6 @@ pub struct Tuning {
     pub drives: Drives,
     /// Weights of the metrics in the objective, in the order of [`METRICS`].
     pub weights: Vec<f64>,
-}
-
-/// What fails in the judged drives.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Faults {
-    /// Instants of a sudden loss of the torque, evenly over the drive.
-    pub sudden_loss: u32,
-    /// Instants from which on no lane comes.
-    pub silent_lane: u32,
-    /// How long a failed drive goes on, s.
-    pub lasts_s: f64,
-}
-
-impl Default for Faults {
-    fn default() -> Self {
-        Self {
-            sudden_loss: 0,
-            silent_lane: 0,
-            lasts_s: 15.0,
-        }
-    }
 }
 
 /// A comparison, checked.
@@ -188,6 +66,8 @@ pub struct Compare<'k> {
     pub tuning: Option<Tuning>,
     /// What fails.
     pub faults: Faults,
+    /// How often intervals hold what they are of.
+    pub level: Confidence,
 }
 
 /// A drive to be done.
@@ -210,34 +90,31 @@ impl<'k> Compare<'k> {
         file::from_text(&source, &text, kinds)
     }
 
-    /// Drives in all, tuning included and failures left out.
-    pub fn drives(&self) -> u64 {
-        let judged = self.jobs(&self.judged, |_| 1).len();
-        let tuning = self.tuning.as_ref();
-        let tuned = tuning.map_or(0, |tuning| {
-            self.jobs(&tuning.drives, |law| tune::sets(self, law).len()).len()
-        });
-        (judged + tuned) as u64
-    }
-
-    /// Tunes, drives and sums up, on all cores; `progress` is called after each drive.
+    /// Tunes, drives and sums up, on all cores.
     ///
     /// # Errors
     /// As [`haptic_sim::scenario::ScenarioBuilder::build`] for a driver's parameters.
-    pub fn run(&self, progress: impl Fn() + Sync) -> Result<CompareResults, ScenarioError> {
-        let tuned = tune::tune(self, &progress)?;
-        let jobs = self.jobs(&self.judged, |_| 1);
+    pub fn run(&self, watch: &Watch<'_>) -> Result<CompareResults, StudyError> {
+        let tuned = tune::tune(self, watch)?;
         // A driver's own set has the driver's number.
-        let sets: Vec<Vec<Vec<f64>>> = tuned.iter().map(|law| law.values.clone()).collect();
-        let jobs: Vec<Job> = jobs
-            .into_iter()
-            .map(|job| Job {
-                set: job.driver,
-                ..job
-            })
-            .collect();
-        let driven = self.drive(&jobs, &sets, &self.judged, "judged", self.faults, &progress)?;
-        Ok(results::sum_up(self, tuned, &jobs, &driven))
+        let of_driver = |job: Job| Job {
+            set: job.driver,
+            ..job
+        };
+        let judged = Stage {
+            compare: self,
+            jobs: self
+                .jobs(&self.judged, |_| 1)
+                .into_iter()
+                .map(of_driver)
+                .collect(),
+            sets: &tuned.iter().map(|law| law.values.clone()).collect::<Vec<_>>(),
+            drives: &self.judged,
+            stream: "judged",
+            faults: self.faults,
+        };
+        let driven = judged.run(watch)?;
+        Ok(results::sum_up(self, tuned, &judged.jobs, &driven))
     }
 
     fn jobs(&self, drives: &Drives, sets: impl Fn(usize) -> usize) -> Vec<Job> {
@@ -259,46 +136,41 @@ impl<'k> Compare<'k> {
         }
         jobs
     }
+}
 
-    /// Drives with sets of parameters for each law; in the order of the jobs, whatever the threads.
-    fn drive(
-        &self,
-        jobs: &[Job],
-        sets: &[Vec<Vec<f64>>],
-        drives: &Drives,
-        stream: &str,
-        faults: Faults,
-        progress: &(impl Fn() + Sync),
-    ) -> Result<Vec<Driven>, ScenarioError> {
-        let drive = |job: &Job| {
-            let (road, speed_kmh, scenario) = &drives.places[job.place];
-            let seed = seed_of(self.seed, stream, road, *speed_kmh, job.seed);
-            let scenario = scenario.to_builder().seed(seed).build()?;
-            let law = self.laws[job.law].make(&scenario, &sets[job.law][job.set])?;
-            let driver = &self.drivers[job.driver];
-            let driver = driver.make(&scenario, &driver.untuned())?;
-            let driven = drive::drive(&scenario, law, driver, faults);
-            progress();
-            Ok(driven)
-        };
-        jobs.par_iter().map(drive).collect()
+/// The drives of a tuning, or those that are judged.
+struct Stage<'a> {
+    compare: &'a Compare<'a>,
+    jobs: Vec<Job>,
+    /// Sets of parameters for each law.
+    sets: &'a [Vec<Vec<f64>>],
+    drives: &'a Drives,
+    stream: &'static str,
+    faults: Faults,
+}
+
+impl Study for Stage<'_> {
+    type Case = Job;
+    type Row = Driven;
+    type Results = Vec<Driven>;
+
+    fn plan(&self) -> Result<Plan<Job>, StudyError> {
+        Ok(Plan::one_by_one(self.jobs.clone()))
     }
-}
 
-/// The seed of a drive: drives of another stream share none.
-pub(crate) fn seed_of(root: u64, stream: &str, road: &str, speed_kmh: f64, number: u32) -> u64 {
-    // 53 bits, which every reader of a number takes whole.
-    named(named(root, stream), &format!("{road} {speed_kmh} {number}")) >> 11
-}
+    fn drive(&self, part: &Part<'_, Job, Driven>) -> Result<Vec<Driven>, StudyError> {
+        part.one_by_one(|job| {
+            let compare = self.compare;
+            let (road, speed_kmh, scenario) = &self.drives.places[job.place];
+            let seed = seed_of(compare.seed, self.stream, road, *speed_kmh, job.seed);
+            let scenario = scenario.to_builder().seed(seed).build()?;
+            let law = compare.laws[job.law].make(&scenario, &self.sets[job.law][job.set])?;
+            let driver = compare.drivers[job.driver].untuned_part(&scenario)?;
+            Ok(Driven::new(&scenario, law, driver, self.faults))
+        })
+    }
 
-/// Does some work on so many threads; none: one a core.
-///
-/// # Errors
-/// The system has no more threads.
-pub fn on_threads<T: Send>(
-    threads: Option<u32>,
-    work: impl FnOnce() -> T + Send,
-) -> Result<T, rayon::ThreadPoolBuildError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0) as usize);
-    Ok(pool.build()?.install(work))
+    fn summarise(&self, _: Vec<Job>, driven: Vec<Driven>) -> Result<Vec<Driven>, StudyError> {
+        Ok(driven)
+    }
 }

@@ -1,21 +1,14 @@
 //! What a comparison found: means over places with intervals over seeds, law by law and driver by driver.
 
+use std::io;
+use std::path::Path;
+
 use serde::Serialize;
 
-use super::drive::{Driven, METRICS, Metric};
 use super::tune::Tuned;
-use super::{Compare, Faults, Job};
-use crate::entries::{Entry, EntryKind};
-use crate::study::interval_of_mean;
-
-/// A mean with its interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Mean {
-    /// Over places and seeds.
-    pub mean: f64,
-    /// Its 95 % interval, Student's over the seeds; none of a single seed.
-    pub interval_95: Option<[f64; 2]>,
-}
+use super::{Compare, Driven, Faults, Job, METRICS, Mean, Metric};
+use crate::engine::{Entry, EntryKind, Tables};
+use crate::statistics::Confidence;
 
 /// A law as it was judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -98,6 +91,9 @@ pub struct CompareResults {
     pub places: Vec<(String, f64)>,
     /// Drives at each place.
     pub seeds: u32,
+    /// How often intervals hold what they are of.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
     /// Sets that were tried for each law with something to tune.
     pub budget: u32,
     /// Instants of a sudden loss and of a silent lane in each drive.
@@ -112,34 +108,22 @@ pub struct CompareResults {
 }
 
 impl CompareResults {
-    /// The table of drives, with a row each.
-    pub fn to_csv(&self) -> String {
-        let names: Vec<&str> = columns().map(|(name, _)| name).collect();
-        let mut text = names.join(",") + "\n";
-        for row in &self.rows {
-            // A road's name may have a comma in it.
-            let entries = row.entries().map(|entry| entry.to_string().replace(',', ";"));
-            text += &(entries.collect::<Vec<_>>().join(",") + "\n");
-        }
-        text
-    }
-
-    /// The same as Parquet.
+    /// Writes the table of drives, with a row each, into a directory: `drives.csv`, and with the feature `parquet` `drives.parquet`.
     ///
     /// # Errors
     /// What the file system says.
-    #[cfg(feature = "parquet")]
-    pub fn write_parquet(&self, file: std::fs::File) -> std::io::Result<()> {
-        let columns = columns().map(|(name, kind)| (name.to_owned(), kind));
+    pub fn write_tables(&self, directory: &Path) -> io::Result<()> {
         let metadata = [
             ("haptic.version", crate::VERSION),
             ("haptic.comparison", &self.name),
         ];
-        let mut table = crate::parquet::Table::create(columns, &metadata, file)?;
+        let places = ["drives.csv", "drives.parquet"].map(|name| directory.join(name));
+        let columns = columns().map(|(name, kind)| (name.to_owned(), kind));
+        let mut tables = Tables::create(columns.collect(), &metadata, &places)?;
         for row in &self.rows {
-            table.row(row.entries())?;
+            tables.row(row.entries().collect())?;
         }
-        table.finish()
+        tables.finish()
     }
 }
 
@@ -186,11 +170,12 @@ pub(super) fn sum_up(
     let cell = |number: usize| {
         let (law, driver) = (number / drivers, number % drivers);
         let (own, first) = (of_cell(law, driver), of_cell(0, driver));
-        let metric = |metric: usize| mean(seeds, own.iter().map(|d| d.values[metric]));
+        let metric = |metric: usize| mean(seeds, compare.level, own.iter().map(|d| d.values[metric]));
         let difference = |metric: usize| {
             let pairs = own.iter().zip(first);
             mean(
                 seeds,
+                compare.level,
                 pairs.map(|(own, first)| Some(own.values[metric]? - first.values[metric]?)),
             )
         };
@@ -226,6 +211,7 @@ pub(super) fn sum_up(
             .collect(),
         worlds: compare.worlds.clone(),
         seeds,
+        level: compare.level,
         budget: compare.tuning.as_ref().map_or(0, |t| t.budget),
         instants: [sudden_loss, silent_lane],
         cells: (0..compare.laws.len() * drivers).map(cell).collect(),
@@ -280,7 +266,7 @@ fn ratios(compare: &Compare, driven: &[Driven]) -> Vec<Ratio> {
         let by_seed: Vec<f64> = (0..seeds)
             .map(|seed| of_seed(&own, seed) / of_seed(&first, seed))
             .collect();
-        let (_, interval) = interval_of_mean(&by_seed)?;
+        let over_seeds = Mean::new(&by_seed, compare.level)?;
         let total = |sums: &[f64]| sums.iter().sum::<f64>();
         let all = |sums: &[Vec<f64>]| sums.iter().map(|of| total(of)).sum::<f64>();
         let each = own
@@ -294,7 +280,7 @@ fn ratios(compare: &Compare, driven: &[Driven]) -> Vec<Ratio> {
             metric,
             mean: Mean {
                 mean: all(&own) / all(&first),
-                interval_95: interval,
+                ..over_seeds
             },
             largest,
         })
@@ -326,7 +312,7 @@ fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &boo
 }
 
 /// Of values by place, then seed: each seed's mean over the places that have a value, then over the seeds.
-fn mean(seeds: u32, values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
+fn mean(seeds: u32, level: Confidence, values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
     let mut sums = vec![(0.0, 0_u32); seeds as usize];
     for (number, value) in values.enumerate() {
         if let Some(value) = value {
@@ -340,6 +326,5 @@ fn mean(seeds: u32, values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
         .filter(|(_, count)| *count > 0)
         .map(|(sum, count)| sum / f64::from(count))
         .collect();
-    let (mean, interval_95) = interval_of_mean(&of_seeds)?;
-    Some(Mean { mean, interval_95 })
+    Mean::new(&of_seeds, level)
 }

@@ -1,9 +1,8 @@
 //! The same budget for every law: its untuned set, and points of Sobol's sequence in the box of what tuning may vary. The set with the
 //! least objective is judged; the objective is a weighted sum of metrics, averaged over the training drives.
 
-use super::drive::{Driven, METRICS};
-use super::{Compare, Faults, ScenarioError};
-use crate::sweep::sobol::Dimension;
+use super::{Compare, Driven, Faults, METRICS, Stage, Study, StudyError, Watch};
+use crate::sobol::Dimension;
 
 /// A law after tuning.
 #[derive(Debug, Clone)]
@@ -44,7 +43,7 @@ pub(super) fn sets(compare: &Compare, law: usize) -> Vec<Vec<f64>> {
     (0..budget).map(set).collect()
 }
 
-pub(super) fn tune(compare: &Compare, progress: &(impl Fn() + Sync)) -> Result<Vec<Tuned>, ScenarioError> {
+pub(super) fn tune(compare: &Compare, watch: &Watch<'_>) -> Result<Vec<Tuned>, StudyError> {
     let all: Vec<Vec<Vec<f64>>> = (0..compare.laws.len()).map(|law| sets(compare, law)).collect();
     let untuned = |law: usize| Tuned {
         values: vec![compare.laws[law].untuned(); compare.drivers.len()],
@@ -53,8 +52,15 @@ pub(super) fn tune(compare: &Compare, progress: &(impl Fn() + Sync)) -> Result<V
     let Some(tuning) = &compare.tuning else {
         return Ok((0..all.len()).map(untuned).collect());
     };
-    let jobs = compare.jobs(&tuning.drives, |law| all[law].len());
-    let driven = compare.drive(&jobs, &all, &tuning.drives, "tuning", Faults::default(), progress)?;
+    let stage = Stage {
+        compare,
+        jobs: compare.jobs(&tuning.drives, |law| all[law].len()),
+        sets: &all,
+        drives: &tuning.drives,
+        stream: "tuning",
+        faults: Faults::default(),
+    };
+    let driven = stage.run(watch)?;
     let drivers = compare.drivers.len();
     let of_driver = tuning.drives.places.len() * tuning.drives.seeds as usize;
     let mean = |group: &[Driven]| {

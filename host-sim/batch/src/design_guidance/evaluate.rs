@@ -9,11 +9,12 @@ use haptic_sim::simulation::{DIVERGED_M, Run};
 use serde::{Deserialize, Serialize};
 
 use super::{DesignGuidance, Gains, Member, Stage, published};
-use crate::compare::{Faults, failures, measured, seed_of};
+use crate::engine::{Faults, Watch, failures, runs};
 use crate::error::StudyError;
-use crate::stability::growth;
+use crate::metrics::measured;
+use crate::places::seed_of;
+use crate::record::growth;
 use crate::statistics::rms;
-use crate::vectorised::run_all;
 
 /// What a set does with a driver, means over places and seeds: peak lateral error to the middle of the lane (m), mean of the size of T_d
 /// (N.m), the same where it is against the guidance and 0 elsewhere (N.m), worst peak of all sudden losses of a drive (m), root mean
@@ -111,9 +112,14 @@ impl DesignGuidance {
                 }
             }
         }
-        let found = run_all(&scenarios, self.seed, |number, run| {
-            Ok(figures(&scenarios[number], run))
-        })?;
+        let own = |scenario: &Scenario| Ok(scenario.clone());
+        let found = runs(
+            &scenarios,
+            self.seed,
+            &Watch::nobody(),
+            own,
+            |_, scenario, run| Ok(figures(scenario, run)),
+        )?;
         let each = found.len() / stage.drivers.len();
         Ok(Evaluated {
             held_out,
@@ -146,8 +152,7 @@ impl DesignGuidance {
 fn figures(scenario: &Scenario, run: &Run) -> Figures {
     let samples = &run.trace.samples;
     if scenario.failure().kind == FailureKind::None {
-        let [peak, _, _, _, effort, _, conflict, ..] =
-            measured(scenario, &run.trace, run.diverged(), &[vec![], vec![]]);
+        let [peak, _, _, _, effort, _, conflict, ..] = measured(scenario, &run.trace, run.diverged(), &[]);
         let [peak, effort, conflict] = [peak, effort, conflict].map(|value| value.unwrap_or(0.0));
         return [peak, effort, conflict, 0.0, noise_nm(run)];
     }

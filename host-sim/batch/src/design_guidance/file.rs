@@ -11,9 +11,9 @@ use toml::Table;
 
 use super::search::BARS;
 use super::{DesignGuidance, Gains, Member, Stage, published};
-use crate::compare::{drives, unknown};
-use crate::files::Source;
-use crate::study::check_names;
+use crate::files::{Source, check_names};
+use crate::parts::unknown;
+use crate::places::drives;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -101,7 +101,7 @@ impl DesignGuidance {
     }
 
     /// Sets that are evaluated at most.
-    pub fn sets(&self) -> u64 {
+    fn sets(&self) -> u64 {
         let stretches = self.stretches.len() as u64;
         2 + stretches * (u64::from(self.budget).next_multiple_of(8) + 1)
     }

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::evaluate::{CONFLICT, EFFORT, LOSS, NOISE, PEAK};
 use super::{DesignGuidance, Evaluated, Figures, Gains, Member, Stage, published};
+use crate::engine::Watch;
 use crate::error::StudyError;
 
 /// What a set is held to: a figure over that of the paper's gains.
@@ -106,7 +107,9 @@ impl DesignGuidance {
         &self,
         known: &[Evaluated],
         mut keep: impl FnMut(&Evaluated) -> Result<(), StudyError>,
+        watch: &Watch<'_>,
     ) -> Result<DesignResults, StudyError> {
+        watch.begin(self.sets(), known.len() as u64)?;
         let mut all = known.to_vec();
         let mut evaluated = |gains: Gains, held_out: bool| {
             let is_it = |set: &&Evaluated| set.held_out == held_out && set.gains == gains;
@@ -115,6 +118,7 @@ impl DesignGuidance {
             }
             let set = self.evaluate(gains, held_out)?;
             keep(&set)?;
+            watch.done(1)?;
             all.push(set.clone());
             Ok(set)
         };

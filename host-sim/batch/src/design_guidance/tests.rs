@@ -7,9 +7,10 @@ use haptic_sim::simulation::simulate;
 
 use super::search::{front, ratios};
 use super::*;
-use crate::compare::seed_of;
+use crate::engine::Watch;
 use crate::files::Source;
 use crate::files::tests::check_refusals;
+use crate::places::seed_of;
 
 const ROAD: &str =
     "lane_width_m = 3.6\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
@@ -145,20 +146,25 @@ fn an_interrupted_search_goes_on_to_the_same_results() {
     let design = design(FILE).unwrap();
     let mut kept = Vec::new();
     let whole = design
-        .run(&[], |found| {
-            kept.push(found.clone());
-            Ok(())
-        })
+        .run(
+            &[],
+            |found| {
+                kept.push(found.clone());
+                Ok(())
+            },
+            &Watch::nobody(),
+        )
         .unwrap();
     // The paper's gains on both drives, two stretches of eight, the best of each.
     assert!(kept.len() <= 20, "{}", kept.len());
-    let stopped = design.run(&[], |_| Err("interrupted".into()));
+    let stopped = design.run(&[], |_| Err("interrupted".into()), &Watch::nobody());
     assert_eq!(stopped, Err("interrupted".into()));
     let mut anew = 0;
-    let resumed = design.run(&kept[..5], |_| {
+    let count = |_: &Evaluated| {
         anew += 1;
         Ok(())
-    });
+    };
+    let resumed = design.run(&kept[..5], count, &Watch::nobody());
     assert_eq!((resumed.unwrap(), anew), (whole.clone(), kept.len() - 5));
     // What may go as far as it likes is at least as good as the paper's gains in what it makes small: on average 1.
     let [peak, worst_four, ..] = whole.choices[1].training.ratios;

@@ -10,7 +10,6 @@ use haptic_analysis::identify::{
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::ExperimentPlan;
@@ -19,6 +18,7 @@ use super::corruptions::{Held, tolerance};
 use super::drives::guided;
 use super::kinds::{ASSUMED_NOT_TO, Drawn, KINDS};
 use super::repetitions::{COMPARED, compared};
+use crate::engine::{Watch, each};
 use crate::error::{StudyError, refuse};
 
 /// What was made of one kind of change.
@@ -65,7 +65,7 @@ pub struct Changes {
 }
 
 /// Drives each participant of `plan` so often, with one kind of change after the other, and identifies each drive as of one driver,
-/// and in pieces where that is refuted; `done` is called after each, from any thread.
+/// and in pieces where that is refuted.
 ///
 /// # Errors
 /// As [`super::experiment`].
@@ -73,7 +73,7 @@ pub fn changes(
     plan: &ExperimentPlan,
     drives: u32,
     only: &str,
-    done: impl Fn() + Sync,
+    watch: &Watch<'_>,
 ) -> Result<Changes, StudyError> {
     let kinds: Vec<_> = KINDS.iter().filter(|(name, _)| name.contains(only)).collect();
     if kinds.is_empty() {
@@ -81,25 +81,21 @@ pub fn changes(
         return refuse(format!("--only {only:?}: none of {names}"));
     }
     let jobs = guided(plan, drives)?;
-    let found = jobs
-        .into_par_iter()
-        .map(|(number, published, drive)| {
-            let place = (drive as usize + number as usize) % kinds.len();
-            let (name, kind) = kinds[place];
-            let plan = plan.repetition(drive);
-            let seed = plan.seed.wrapping_mul(100).wrapping_add(u64::from(number));
-            let drawn = kind.drawn(&published, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
-            let log = drawn.log(&plan, number)?;
-            let options = Options::default();
-            let whole = identify_with_noise_model(&log, &options);
-            let pieces = whole.changed().map(|_| identify_in_pieces(&log, &options));
-            done();
-            Ok((
-                place,
-                ChangesLine::new(name, &drawn, &log, &whole, pieces.as_ref()),
-            ))
-        })
-        .collect::<Result<Vec<_>, StudyError>>()?;
+    let found = each(&jobs, watch, |&(number, published, drive)| {
+        let place = (drive as usize + number as usize) % kinds.len();
+        let (name, kind) = kinds[place];
+        let plan = plan.repetition(drive);
+        let seed = plan.seed.wrapping_mul(100).wrapping_add(u64::from(number));
+        let drawn = kind.drawn(&published, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let log = drawn.log(&plan, number)?;
+        let options = Options::default();
+        let whole = identify_with_noise_model(&log, &options);
+        let pieces = whole.changed().map(|_| identify_in_pieces(&log, &options));
+        Ok((
+            place,
+            ChangesLine::new(name, &drawn, &log, &whole, pieces.as_ref()),
+        ))
+    })?;
     let lines: Vec<ChangesLine> = (0..kinds.len())
         .filter_map(|place| {
             let of_kind = found.iter().filter(|f| f.0 == place).map(|f| f.1.clone());

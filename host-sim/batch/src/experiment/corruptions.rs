@@ -8,7 +8,6 @@
 use haptic_analysis::identify::{
     DriveLog, Identification, Options, Parameters, Traces, identify_with_noise_model,
 };
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::changing::driver_at;
@@ -16,6 +15,7 @@ use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
 use super::drives::{driven_by, guided};
 use super::repetitions::{COMPARED, Compared, bound_of, compared};
 use super::{ExperimentPlan, PublishedDriver};
+use crate::engine::{Watch, each};
 use crate::error::StudyError;
 use crate::statistics::rms;
 
@@ -109,7 +109,7 @@ pub struct Corruptions {
 }
 
 /// Corrupts the guided drives of `plan` with `seeds` seeds from its own on in the ways of [`POPULATION`] whose name holds
-/// `only`, and identifies each; `done` is called after each, from any thread.
+/// `only`, and identifies each.
 ///
 /// # Errors
 /// As [`super::experiment`].
@@ -117,7 +117,7 @@ pub fn corruptions(
     plan: &ExperimentPlan,
     seeds: u32,
     only: &str,
-    done: impl Fn() + Sync,
+    watch: &Watch<'_>,
 ) -> Result<Corruptions, StudyError> {
     let ways: Vec<(&'static str, &[Corruption])> = POPULATION
         .iter()
@@ -126,51 +126,47 @@ pub fn corruptions(
         .collect();
     let jobs = guided(plan, seeds)?;
     // What is driven differs by the driver's muscle alone: each muscle drives once, and its log is corrupted in all ways.
-    let found = jobs
-        .into_par_iter()
-        .map(|(number, truth, seed)| {
-            let plan = plan.repetition(seed);
-            let mut clean: Vec<(f64, DriveLog)> = Vec::new();
-            let mut fits = Vec::with_capacity(ways.len());
-            for (_, ways) in &ways {
-                let changing = changing(ways, &truth, &plan, number);
-                let mut driver = truth.parameters();
-                for way in *ways {
-                    if let Corruption::OtherMuscle(t_nms) = way {
-                        driver.t_nms = *t_nms;
-                    }
+    let found = each(&jobs, watch, |&(number, truth, seed)| {
+        let plan = plan.repetition(seed);
+        let mut clean: Vec<(f64, DriveLog)> = Vec::new();
+        let mut fits = Vec::with_capacity(ways.len());
+        for (_, ways) in &ways {
+            let changing = changing(ways, &truth, &plan, number);
+            let mut driver = truth.parameters();
+            for way in *ways {
+                if let Corruption::OtherMuscle(t_nms) = way {
+                    driver.t_nms = *t_nms;
                 }
-                if !clean.iter().any(|c| c.0 == driver.t_nms) {
-                    clean.push((driver.t_nms, driven_by(&plan, number, &truth, driver)?.log));
-                }
-                let Some((_, log)) = clean.iter().find(|c| c.0 == driver.t_nms) else {
-                    unreachable!("it was driven")
-                };
-                let changed = changing
-                    .as_ref()
-                    .map(|drawn| drawn.log(&plan, number))
-                    .transpose()?;
-                let log = corrupted_log(changed.as_ref().unwrap_or(log), ways, &plan, number);
-                let options = Options {
-                    manual: ways.contains(&Corruption::CalledManual),
-                    ..Options::default()
-                };
-                let mut fit = identify_with_noise_model(&log, &options);
-                fit.traces = Traces::default();
-                let values = match &changing {
-                    None => compared(&truth, &fit.parameters),
-                    Some(drawn) => {
-                        let last = driver_at(&drawn.first, &drawn.changes, f64::INFINITY);
-                        compared_with_nearer([drawn.first, last], &fit.parameters)
-                    }
-                };
-                fits.push((values, fit));
-                done();
             }
-            let bound = clean.first().map(|(_, log)| bound_of(log, &truth));
-            Ok((fits, bound.unwrap_or_default()))
-        })
-        .collect::<Result<Vec<_>, StudyError>>()?;
+            if !clean.iter().any(|c| c.0 == driver.t_nms) {
+                clean.push((driver.t_nms, driven_by(&plan, number, &truth, driver)?.log));
+            }
+            let Some((_, log)) = clean.iter().find(|c| c.0 == driver.t_nms) else {
+                unreachable!("it was driven")
+            };
+            let changed = changing
+                .as_ref()
+                .map(|drawn| drawn.log(&plan, number))
+                .transpose()?;
+            let log = corrupted_log(changed.as_ref().unwrap_or(log), ways, &plan, number);
+            let options = Options {
+                manual: ways.contains(&Corruption::CalledManual),
+                ..Options::default()
+            };
+            let mut fit = identify_with_noise_model(&log, &options);
+            fit.traces = Traces::default();
+            let values = match &changing {
+                None => compared(&truth, &fit.parameters),
+                Some(drawn) => {
+                    let last = driver_at(&drawn.first, &drawn.changes, f64::INFINITY);
+                    compared_with_nearer([drawn.first, last], &fit.parameters)
+                }
+            };
+            fits.push((values, fit));
+        }
+        let bound = clean.first().map(|(_, log)| bound_of(log, &truth));
+        Ok((fits, bound.unwrap_or_default()))
+    })?;
     let bound = std::array::from_fn(|i| rms(found.iter().map(|f| f.1[i])).unwrap_or(0.0));
     let mut fits: Vec<Vec<_>> = ways.iter().map(|_| Vec::new()).collect();
     for (each, _) in found {

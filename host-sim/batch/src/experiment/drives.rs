@@ -2,23 +2,21 @@
 
 use haptic_analysis::identify::DriveLog;
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::models::road::Course;
 use haptic_sim::participants::{Participant, PublishedDriver};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario};
-use haptic_sim::simulation;
-use haptic_vectorised::{Event, Options};
+use haptic_sim::simulation::Run;
 
-use super::{ExperimentPlan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, chosen, path_of};
+use super::{ExperimentPlan, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, chosen, path_of};
 use crate::Away;
 use crate::error::StudyError;
-use crate::vectorised::{Checked, Group, in_groups};
+use crate::recorder::recorded;
 
 /// A drive with what is needed to judge it.
-pub(crate) struct Driven {
+pub(super) struct Driven {
     pub(super) scenario: Scenario,
-    pub(crate) log: DriveLog,
+    pub(super) log: DriveLog,
     pub(super) path: Vec<(f64, f64)>,
-    pub(crate) away: Away,
+    pub(super) away: Away,
 }
 
 /// The guided drives of a plan, each participant so often: number, driver, and what counts on from the plan's seed.
@@ -50,7 +48,7 @@ pub(super) fn driven_by(
     truth: &PublishedDriver,
     driver: DriverParameters,
 ) -> Result<Driven, StudyError> {
-    Ok(driven_alone(&scenario_of_drive(plan, number, truth, driver)?))
+    Ok(Driven::alone(&scenario_of_drive(plan, number, truth, driver)?))
 }
 
 /// What a published driver drives with a remnant and the paper's sensors.
@@ -78,112 +76,20 @@ pub(super) fn scenario_of_drive(
     Ok(scenario.to_builder().driver(driver).build()?)
 }
 
-pub(super) fn driven_alone(scenario: &Scenario) -> Driven {
-    let mut recorder = Recorder::new(true);
-    let run = simulation::observe(scenario, |outcome| recorder.observe(outcome));
-    Driven {
-        scenario: scenario.clone(),
-        log: recorder.into_log(),
-        path: path_of(&run.trace),
-        away: Away::new(scenario, &run.trace),
-    }
-}
-
-/// Drives a scenario for each job on all cores, side by side where that can be, and gives what `judge` makes of its log. Group by
-/// group: the logs of all drives at once may be too many.
-///
-/// # Errors
-/// What `scenario` says; a drive that differs from the shipping ECU's.
-pub(crate) fn log_each<J: Sync, T: Send>(
-    jobs: &[J],
-    seed: u64,
-    scenario: impl Fn(&J) -> Result<Scenario, StudyError> + Sync,
-    judge: impl Fn(Driven, &J) -> T + Sync,
-) -> Result<Vec<T>, StudyError> {
-    let checked = Checked::new(seed, jobs.len() as u64);
-    in_groups(jobs, |first, jobs| {
-        let scenarios: Vec<Scenario> = jobs.iter().map(&scenario).collect::<Result<_, _>>()?;
-        let driven = log_group(Group {
-            scenarios: &scenarios,
-            first: first as u64,
-            checked,
-        })?;
-        Ok(driven
-            .into_iter()
-            .zip(jobs)
-            .map(|(driven, job)| judge(driven, job))
-            .collect())
-    })
-}
-
-/// The drives of a group, logged.
-fn log_group(group: Group) -> Result<Vec<Driven>, StudyError> {
-    let scenarios = group.scenarios;
-    let options = Options {
-        every_step: true,
-        ..Options::default()
-    };
-    let mut recorders = vec![Recorder::new(true); scenarios.len()];
-    let mut all: Vec<Option<Driven>> = scenarios.iter().map(|_| None).collect();
-    let alone = |place: usize| simulation::simulate(&scenarios[place]);
-    let rejected = group.run_batch(options, alone, |place, event| {
-        match event {
-            Event::Steps(steps) => steps.iter().for_each(|step| recorders[place].take(*step)),
-            Event::Ended(run) => {
-                all[place] = Some(Driven {
-                    scenario: scenarios[place].clone(),
-                    log: std::mem::replace(&mut recorders[place], Recorder::new(true)).into_log(),
-                    path: path_of(&run.trace),
-                    away: Away::new(&scenarios[place], &run.trace),
-                });
-            }
-            Event::Rejected(_) => (),
+impl Driven {
+    pub(super) fn new(scenario: &Scenario, run: &Run, log: DriveLog) -> Self {
+        Self {
+            scenario: scenario.clone(),
+            log,
+            path: path_of(&run.trace),
+            away: Away::new(scenario, &run.trace),
         }
-        Ok(())
-    })?;
-    for place in rejected {
-        all[place] = Some(driven_alone(&scenarios[place]));
     }
-    Ok(all.into_iter().flatten().collect())
-}
 
-/// A guided drive of a published driver with the remnant and the paper's sensors, on any course (the built-in one if
-/// none), as it is logged.
-///
-/// # Errors
-/// A course that is too short; a probe that the controller refuses.
-pub fn recorded(
-    driver: &PublishedDriver,
-    course: Option<&Course>,
-    probe: Option<Probe>,
-    seed: u64,
-) -> Result<DriveLog, StudyError> {
-    Ok(driven_alone(&guided_drive(driver, course, probe, seed)?).log)
-}
-
-/// The scenario of that drive.
-///
-/// # Errors
-/// A course that is too short; a probe that the controller refuses.
-pub(crate) fn guided_drive(
-    driver: &PublishedDriver,
-    course: Option<&Course>,
-    probe: Option<Probe>,
-    seed: u64,
-) -> Result<Scenario, StudyError> {
-    let mut scenario = Scenario::builder()
-        .driver(DriverParameters {
-            remnant_sd_nm: REMNANT_GUIDED_NM,
-            ..driver.parameters()
-        })
-        .condition(Condition::Custom)
-        .gains(driver.gains())
-        .guidance(probe.map_or_else(GuidanceParameters::default, Probe::guidance))
-        .seed(seed);
-    if let Some(course) = course {
-        scenario = scenario.course(course.clone());
+    fn alone(scenario: &Scenario) -> Self {
+        let (run, log) = recorded(scenario);
+        Self::new(scenario, &run, log)
     }
-    Ok(scenario.build()?)
 }
 
 /// The drive of a published driver, without remnant.
@@ -209,6 +115,7 @@ fn scenario_of(plan: &ExperimentPlan, driver: &PublishedDriver, seed: u64) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::{Watch, logs};
 
     /// Every value of every row: from the steps of vectorised runs as from those of the shipping ECU, with and without guidance
     /// and probe, and where a run is rejected.
@@ -240,10 +147,11 @@ mod tests {
             columns.map(|column| column.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
         };
         let clone = |scenario: &Scenario| Ok(scenario.clone());
-        let found = log_each(&scenarios, 1, clone, |driven, _| driven).unwrap();
+        let measure = |_: &_, scenario: &_, run: &_, log| Ok(Driven::new(scenario, run, log));
+        let found = logs(&scenarios, 1, &Watch::nobody(), clone, measure).unwrap();
         assert_eq!(found.len(), scenarios.len());
         for (driven, scenario) in found.iter().zip(&scenarios) {
-            let alone = driven_alone(scenario);
+            let alone = Driven::alone(scenario);
             assert!(driven.log.len() > 20_000);
             assert_eq!(bits(driven), bits(&alone));
             assert_eq!((&driven.path, &driven.scenario), (&alone.path, scenario));

@@ -5,13 +5,13 @@
 //! *default* takes the vehicle's answer to the wheel angle out of that course. *Published* is the paper's.
 
 use haptic_analysis::identify::{Identification, Options, identify_as_published, identify_with_noise_model};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::ExperimentPlan;
 use super::corruption::{Corruption, POPULATION, corrupted_log};
 use super::drives::{driven, guided};
 use super::repetitions::{COMPARED, bound_of, compared};
+use crate::engine::{Watch, each};
 use crate::error::StudyError;
 use crate::statistics::rms;
 
@@ -47,49 +47,45 @@ pub struct Methods {
     pub lines: Vec<MethodLine>,
 }
 
-/// Identifies `seeds` guided drives of each participant of `plan` in all ways; `done` is called after each drive.
+/// Identifies `seeds` guided drives of each participant of `plan` in all ways.
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn methods(plan: &ExperimentPlan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
+pub fn methods(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Result<Methods, StudyError> {
     let jobs = guided(plan, seeds)?;
     let noises: Vec<(&'static str, &[Corruption])> = POPULATION
         .iter()
         .filter(|(_, ways)| matches!(ways, [] | [Corruption::LaneNoise(..)]))
         .copied()
         .collect();
-    let found = jobs
-        .into_par_iter()
-        .map(|(number, truth, seed)| {
-            let plan = plan.repetition(seed);
-            let log = driven(&plan, number, &truth)?.log;
-            let bound = bound_of(&log, &truth);
-            let values: Vec<_> = noises
-                .iter()
-                .flat_map(|(_, ways)| {
-                    let log = corrupted_log(&log, ways, &plan, number);
-                    let none = Options {
-                        lane_noise: false,
-                        ..Options::default()
-                    };
-                    let plain = Options {
-                        plain_smoother: true,
-                        ..Options::default()
-                    };
-                    let ours = |o: &Options| Some(identify_with_noise_model(&log, o));
-                    [
-                        ours(&none),
-                        ours(&plain),
-                        ours(&Options::default()),
-                        identify_as_published(&log, &Options::default()).ok(),
-                    ]
-                })
-                .map(|f: Option<Identification>| f.map(|f| compared(&truth, &f.parameters)))
-                .collect();
-            done();
-            Ok((bound, values))
-        })
-        .collect::<Result<Vec<_>, StudyError>>()?;
+    let found = each(&jobs, watch, |&(number, truth, seed)| {
+        let plan = plan.repetition(seed);
+        let log = driven(&plan, number, &truth)?.log;
+        let bound = bound_of(&log, &truth);
+        let values: Vec<_> = noises
+            .iter()
+            .flat_map(|(_, ways)| {
+                let log = corrupted_log(&log, ways, &plan, number);
+                let none = Options {
+                    lane_noise: false,
+                    ..Options::default()
+                };
+                let plain = Options {
+                    plain_smoother: true,
+                    ..Options::default()
+                };
+                let ours = |o: &Options| Some(identify_with_noise_model(&log, o));
+                [
+                    ours(&none),
+                    ours(&plain),
+                    ours(&Options::default()),
+                    identify_as_published(&log, &Options::default()).ok(),
+                ]
+            })
+            .map(|f: Option<Identification>| f.map(|f| compared(&truth, &f.parameters)))
+            .collect();
+        Ok((bound, values))
+    })?;
     let mut lines = Vec::new();
     for (n, (noise, _)) in noises.iter().enumerate() {
         for (m, method) in METHODS.iter().enumerate() {

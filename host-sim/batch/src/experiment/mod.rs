@@ -19,46 +19,36 @@ mod corruptions;
 mod drives;
 mod kinds;
 mod methods;
-mod recorder;
 mod recordings;
 mod repetitions;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
+pub use crate::paper::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
+pub use crate::recorder::Recorder;
 pub use changes::{Changes, ChangesLine, changes};
 pub use changing::{Changed, DriverChanges, driver_at};
 pub use corruption::{Corruption, POPULATION};
 pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
 pub use kinds::{KINDS, Kind};
 pub use methods::{METHODS, MethodLine, Methods, methods};
-pub use recorder::Recorder;
 pub use recordings::{CHANNELS, Channel, recordings};
 pub use repetitions::{Repeated, Repetitions, repeat};
 
 use haptic_analysis::identify::{
-    DriveLog, Identification, Muscle, Options, TABLE_4, Truth, identify_as_published,
-    identify_with_noise_model,
+    DriveLog, Identification, Options, identify_as_published, identify_with_noise_model,
 };
 use haptic_log::trace::Trace;
-use haptic_sim::models::STEP_S;
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{Participant, PublishedDriver, participant};
-use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
+use haptic_sim::scenario::Scenario;
 
 use crate::Away;
+use crate::drivers::identified_driver;
+pub use crate::drivers::{Probe, truth_of};
+use crate::engine::{Watch, logs, runs};
 use crate::error::StudyError;
-use crate::vectorised::run_all;
-pub use drives::recorded;
 use drives::{Driven, scenario_of_drive};
-pub(crate) use drives::{guided_drive, log_each};
-pub(crate) use repetitions::compared;
-
-/// Standard deviation of the remnant in manual driving, N.m.
-pub const REMNANT_MANUAL_NM: f64 = 0.097;
-/// Standard deviation of the remnant with guidance, N.m.
-pub const REMNANT_GUIDED_NM: f64 = 0.072;
 
 /// The paper's trajectory errors with guidance over its participants: smallest, mean, largest, m (4.4).
 pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];
@@ -141,11 +131,11 @@ pub struct Finding {
     pub path: Vec<(f64, f64)>,
 }
 
-/// Drives, identifies and validates; `done` is called after each drive, from any thread.
+/// Drives, identifies and validates.
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn experiment(plan: &ExperimentPlan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
+pub fn experiment(plan: &ExperimentPlan, watch: &Watch<'_>) -> Result<Experiment, StudyError> {
     let drives: Vec<_> = chosen(&plan.participants)?
         .into_iter()
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])
@@ -154,16 +144,22 @@ pub fn experiment(plan: &ExperimentPlan, done: impl Fn() + Sync) -> Result<Exper
     let scenario = |(number, truth): &(u32, PublishedDriver)| {
         scenario_of_drive(plan, *number, truth, truth.parameters())
     };
-    let driven = log_each(&drives, plan.seed, scenario, |driven, _| driven)?;
-    let found = driven.par_iter().zip(&drives).map(|(driven, (_, truth))| {
-        let found = identified(driven, truth);
-        done();
-        found
-    });
-    let found: Vec<[Identified; 2]> = found.collect::<Result<_, _>>()?;
+    let found = logs(
+        &drives,
+        plan.seed,
+        watch,
+        scenario,
+        |(_, truth), scenario, run, log| {
+            let driven = Driven::new(scenario, run, log);
+            let found = identified(&driven, truth)?;
+            Ok((driven, found))
+        },
+    )?;
+    let (driven, found): (Vec<Driven>, Vec<[Identified; 2]>) = found.into_iter().unzip();
     let again: Vec<Scenario> = found.iter().flatten().map(|f| f.driver.clone()).collect();
-    let paths = run_all(&again, plan.seed, |number, run| {
-        let away = Away::new(&again[number], &run.trace);
+    let own = |scenario: &Scenario| Ok(scenario.clone());
+    let paths = runs(&again, plan.seed, &Watch::nobody(), own, |_, scenario, run| {
+        let away = Away::new(scenario, &run.trace);
         Ok((path_of(&run.trace), run.diverged(), away))
     })?;
     let mut findings = found.into_iter().flatten().zip(paths);
@@ -235,85 +231,6 @@ fn identified(driven: &Driven, truth: &PublishedDriver) -> Result<[Identified; 2
         found(identify_with_noise_model(&driven.log, &options))?,
         found(identify_as_published(&driven.log, &options)?)?,
     ])
-}
-
-/// A probe of the controller's.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Probe {
-    /// N.m.
-    pub amplitude_nm: f64,
-    /// Hz.
-    pub frequency_hz: f64,
-}
-
-impl Probe {
-    /// The guidance with this probe.
-    fn guidance(self) -> GuidanceParameters {
-        let mut guidance = GuidanceParameters {
-            probe: true,
-            ..GuidanceParameters::default()
-        };
-        guidance.controller.probe_amplitude_nm = self.amplitude_nm;
-        guidance.controller.probe_frequency_hz = self.frequency_hz;
-        guidance
-    }
-
-    /// Whether the controller takes it.
-    pub fn is_accepted(self) -> bool {
-        let scenario = Scenario::builder()
-            .condition(Condition::Custom)
-            .guidance(self.guidance());
-        scenario.build().is_ok()
-    }
-}
-
-/// What a published driver and the remnant of the guided drives are, for the information bound.
-pub fn truth_of(driver: &PublishedDriver) -> Truth {
-    let sum = driver.k_d + Muscle::default().k_nms;
-    Truth {
-        gain: [sum * driver.a_1, sum * driver.a_2, sum * driver.a_3],
-        k_hg: driver.k_hg.unwrap_or(0.0),
-        t_p_s: driver.t_p,
-        remnant_sd_nm: REMNANT_GUIDED_NM,
-        remnant_corner_hz: driver.parameters().remnant_corner_hz,
-        // The torque sensor's rounding to 0.005 N.m.
-        sensor_sd_nm: 0.005 / 12.0_f64.sqrt(),
-    }
-}
-
-/// `scenario` with the driver identified in place of its own, without remnant. Where K_d and a_i are not told
-/// apart, table 4's K_d splits the gains: the torque does not depend on the split. A parameter that is not
-/// identified has its place on the ridge that the search ended on.
-pub(super) fn identified_driver(
-    scenario: &Scenario,
-    found: &Identification,
-    muscle: Muscle,
-) -> Result<Scenario, ScenarioError> {
-    let p = &found.parameters;
-    let k_d = p.k_d.optimum.unwrap_or(TABLE_4[4].0);
-    let sum = k_d + muscle.k_nms;
-    let a = [&p.gain_1, &p.gain_2, &p.gain_3].map(|gain| gain.optimum.unwrap_or(0.0) / sum);
-    let driver = DriverParameters {
-        a_1: a[0],
-        a_2: a[1],
-        a_3: a[2],
-        t_p: p.t_p.optimum.unwrap_or(0.0).max(STEP_S),
-        t_nms: muscle.t_nms_s,
-        k_nms: muscle.k_nms,
-        remnant_sd_nm: 0.0,
-        ..*scenario.driver()
-    };
-    let manual = scenario.condition() == Condition::Manual;
-    let k_hg = if manual {
-        0.0
-    } else {
-        p.k_hg.optimum.unwrap_or(0.0)
-    };
-    scenario
-        .to_builder()
-        .driver(driver)
-        .gains(ArmGains { k_d, k_hg })
-        .build()
 }
 
 fn path_of(trace: &Trace) -> Vec<(f64, f64)> {

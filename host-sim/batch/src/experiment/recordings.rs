@@ -14,12 +14,12 @@ use haptic_sim::simulation;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, Normal};
-use rayon::prelude::*;
 
 use super::ExperimentPlan;
 use super::corruptions::{CorruptionLine, Corruptions, Held};
 use super::drives::{guided, scenario_of_drive};
 use super::repetitions::{COMPARED, Compared, compared};
+use crate::engine::{Watch, each};
 use crate::error::StudyError;
 
 /// How a drive is recorded.
@@ -94,46 +94,38 @@ pub const CHANNELS: [(&str, Channel); 9] = [
 ];
 
 /// Records the guided drives of `plan` with `seeds` seeds from its own on by each of [`CHANNELS`], and identifies each as `identify
-/// --layout openlka` does; `done` is called after each, from any thread. The corruptions of the result are the channels; no
+/// --layout openlka` does. The corruptions of the result are the channels; no
 /// information bound is given for them.
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn recordings(
-    plan: &ExperimentPlan,
-    seeds: u32,
-    done: impl Fn() + Sync,
-) -> Result<Corruptions, StudyError> {
+pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Result<Corruptions, StudyError> {
     let layout = Layout::named("openlka")?;
     let jobs = guided(plan, seeds)?;
-    let found = jobs
-        .into_par_iter()
-        .map(|(number, truth, seed)| {
-            let drive = |probe_nm| {
-                let plan = ExperimentPlan {
-                    seed: plan.seed.wrapping_add(seed),
-                    probe_nm,
-                    ..plan.clone()
-                };
-                let scenario = scenario_of_drive(&plan, number, &truth, truth.parameters())?;
-                Ok::<_, StudyError>(simulation::simulate(&scenario).trace)
+    let found = each(&jobs, watch, |&(number, truth, seed)| {
+        let drive = |probe_nm| {
+            let plan = ExperimentPlan {
+                seed: plan.seed.wrapping_add(seed),
+                probe_nm,
+                ..plan.clone()
             };
-            let drives = [drive(0.0)?, drive(plan.probe_nm)?];
-            let mut random = Xoshiro256PlusPlus::seed_from_u64(
-                plan.seed
-                    .wrapping_add(seed)
-                    .wrapping_mul(100)
-                    .wrapping_add(u64::from(number)),
-            );
-            let fit = |(_, channel): &(&str, Channel)| {
-                let bytes = channel.record(&drives[usize::from(channel.probe)], &mut random);
-                let fit = identified(bytes, &layout);
-                done();
-                fit.map(|fit| (compared(&truth, &fit.parameters), fit))
-            };
-            Ok(CHANNELS.iter().map(fit).collect::<Vec<_>>())
-        })
-        .collect::<Result<Vec<_>, StudyError>>()?;
+            let scenario = scenario_of_drive(&plan, number, &truth, truth.parameters())?;
+            Ok::<_, StudyError>(simulation::simulate(&scenario).trace)
+        };
+        let drives = [drive(0.0)?, drive(plan.probe_nm)?];
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(
+            plan.seed
+                .wrapping_add(seed)
+                .wrapping_mul(100)
+                .wrapping_add(u64::from(number)),
+        );
+        let fit = |(_, channel): &(&str, Channel)| {
+            let bytes = channel.record(&drives[usize::from(channel.probe)], &mut random);
+            let fit = identified(bytes, &layout);
+            fit.map(|fit| (compared(&truth, &fit.parameters), fit))
+        };
+        Ok(CHANNELS.iter().map(fit).collect::<Vec<_>>())
+    })?;
     let lines = CHANNELS.iter().enumerate().map(|(k, (name, _))| {
         let fits: Vec<([Compared; COMPARED], Identification)> =
             found.iter().filter_map(|each| each[k].clone()).collect();

@@ -5,16 +5,13 @@
 
 use serde::Serialize;
 
-use super::drives::{guided, log_each, scenario_of_drive};
+use super::drives::{guided, scenario_of_drive};
 use super::{ExperimentPlan, PublishedDriver, truth_of};
+pub(super) use crate::drivers::{COMPARED, Compared, compared};
+use crate::engine::{Watch, logs};
 use crate::error::StudyError;
 use crate::statistics::{mean, rms};
-use haptic_analysis::identify::{
-    DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
-};
-
-/// What is compared with the truth: the parameters that a torque record can carry.
-pub(crate) const COMPARED: usize = 5;
+use haptic_analysis::identify::{DriveLog, Identification, Options, identify_with_noise_model, information};
 
 /// What the repetitions found.
 #[derive(Debug, Clone, Serialize)]
@@ -58,28 +55,23 @@ pub struct Repeated {
     pub bound: f64,
 }
 
-/// Repeats the guided drives of `plan` and identifies each by the default method; `done` is called after each, from
-/// any thread.
+/// Repeats the guided drives of `plan` and identifies each by the default method.
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn repeat(
-    plan: &ExperimentPlan,
-    repetitions: u32,
-    done: impl Fn() + Sync,
-) -> Result<Repetitions, StudyError> {
+pub fn repeat(plan: &ExperimentPlan, repetitions: u32, watch: &Watch<'_>) -> Result<Repetitions, StudyError> {
     let jobs = guided(plan, repetitions)?;
-    let found: Vec<DriveResult> = log_each(
+    let found: Vec<DriveResult> = logs(
         &jobs,
         plan.seed,
+        watch,
         |(number, truth, repetition)| {
             let plan = plan.repetition(*repetition);
             scenario_of_drive(&plan, *number, truth, truth.parameters())
         },
-        |driven, (_, truth, _)| {
-            let identification = identify_with_noise_model(&driven.log, &Options::default());
-            done();
-            DriveResult::new(truth, &identification, bound_of(&driven.log, truth))
+        |(_, truth, _), _, _, log| {
+            let identification = identify_with_noise_model(&log, &Options::default());
+            Ok(DriveResult::new(truth, &identification, bound_of(&log, truth)))
         },
     )?;
     let lines = |participant: Option<u32>, drives: &[DriveResult]| {
@@ -134,20 +126,6 @@ pub(super) fn bound_of(log: &DriveLog, truth: &PublishedDriver) -> [f64; COMPARE
     let least = information(log, &Options::default(), &truth_of(truth));
     let [gain_1, gain_2, gain_3, k_hg, t_p, _] = least.standard_errors(true);
     [gain_1, gain_2, gain_3, t_p, k_hg]
-}
-
-/// A parameter's key, what was found, and the truth.
-pub(crate) type Compared = (&'static str, Parameter, f64);
-
-pub(crate) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
-    let sum = truth.k_d + Muscle::default().k_nms;
-    [
-        ("gain_1", found.gain_1, sum * truth.a_1),
-        ("gain_2", found.gain_2, sum * truth.a_2),
-        ("gain_3", found.gain_3, sum * truth.a_3),
-        ("t_p", found.t_p, truth.t_p),
-        ("k_hg", found.k_hg, truth.k_hg.unwrap_or(0.0)),
-    ]
 }
 
 impl Repeated {

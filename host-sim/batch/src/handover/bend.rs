@@ -4,10 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::error::StudyError;
-use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
+use haptic_sim::models::road::{Course, CourseError, DEFAULT_LANE_WIDTH_M, Segment};
 use haptic_sim::scenario::DEFAULT_SPEED_KMH;
-use haptic_sim::simulation::Run;
 
 /// Speeds, km/h.
 const SPEEDS_KMH: [f64; 5] = [40.0, 60.0, 80.0, 100.0, 130.0];
@@ -24,8 +22,6 @@ const ARC_S: f64 = 6.0;
 const BEFORE_S: f64 = 6.0;
 /// Instants are taken from so long before the bend to so long behind it, s.
 const BEYOND_S: f64 = 2.0;
-/// Length of the last straight of [`stretched_curve`], m at 60 km/h.
-const LAST_STRAIGHT_M: f64 = 400.0;
 
 /// Which way a bend turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -95,7 +91,7 @@ impl Bend {
     }
 
     /// The road, with so long a straight behind the bend.
-    pub(super) fn course(&self, side: Side, behind_s: f64) -> Result<Course, StudyError> {
+    pub(super) fn course(&self, side: Side, behind_s: f64) -> Result<Course, CourseError> {
         let curvature = match side {
             Side::Left => 1.0 / self.radius_m,
             Side::Right => -1.0 / self.radius_m,
@@ -108,7 +104,7 @@ impl Bend {
             Segment::clothoid(clothoid_m, curvature, 0.0),
             Segment::straight(behind_s * self.m_per_s()),
         ];
-        Ok(Course::new("bend", DEFAULT_LANE_WIDTH_M, segments)?)
+        Course::new("bend", DEFAULT_LANE_WIDTH_M, segments)
     }
 
     /// When the bend begins, s after the start of the drive.
@@ -146,26 +142,4 @@ impl Bend {
             None => format!("{:.2} s behind the bend", instant_s - self.ends_s()),
         }
     }
-}
-
-/// Largest lateral error from a place on, m; `None` for a run that diverged.
-pub(crate) fn peak_m(run: &Run, from_m: f64) -> Option<f64> {
-    let samples = run.trace.samples.iter().filter(|s| s.s_m >= from_m);
-    (!run.diverged()).then(|| samples.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max))
-}
-
-/// The first curve of the paper's course, every length `k` and every radius `k^2` times as long: at `k` times 60 km/h it is met at
-/// the same time, with the same lateral acceleration of 0.93 m/s2.
-pub(crate) fn stretched_curve(k: f64) -> Result<Course, StudyError> {
-    let curvature = 1.0 / (300.0 * k * k);
-    let (clothoid, arc) = (80.0 * k, 300.0 * k);
-    let segments = vec![
-        Segment::straight(120.0 * k),
-        Segment::clothoid(clothoid, 0.0, curvature),
-        Segment::arc(arc, curvature),
-        Segment::clothoid(clothoid, curvature, 0.0),
-        Segment::straight(LAST_STRAIGHT_M * k),
-    ];
-    let name = "first curve of paper-course, stretched";
-    Ok(Course::new(name, DEFAULT_LANE_WIDTH_M, segments)?)
 }

@@ -11,25 +11,28 @@
 //! left out: this driver drives nearly as by hand.
 //!
 //! - [`Bend`]: the roads and their speeds.
-//! - [`study`]: the drives, and the worst and the median of what they cost.
+//! - [`Handover`]: the drives, and the worst and the median of what they cost.
 //! - [`HandoverResults`]: what the study found, and what a row has to keep.
 
 mod bend;
+mod instants;
 mod results;
 #[cfg(test)]
 mod tests;
 
 pub use bend::{Bend, Side};
-pub(crate) use bend::{peak_m, stretched_curve};
+use instants::{instants, row};
 pub use results::{Figure, HandoverResults, HandoverRow, MOST_BESIDE_DROP, Place};
 
-use super::Away;
-use super::evaluate::DRIVERS_T_P;
-use super::vectorised::run_all;
+use crate::Away;
+use crate::engine::{Part, Plan, Study};
 use crate::error::StudyError;
+use crate::paper::DRIVERS_T_P;
+use crate::record::peak_m;
 use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario};
-use haptic_sim::simulation::{DIVERGED_M, Run};
+use haptic_sim::simulation::Run;
 
 /// Spacing of the instants, s.
 pub const EVERY_S: f64 = 0.25;
@@ -37,106 +40,121 @@ pub const EVERY_S: f64 = 0.25;
 pub const RELIANCES: [Condition; 2] = [Condition::High, Condition::Mid];
 /// When drivers take over after a failure, s; the paper's after 1 s.
 pub const TAKES_OVER_S: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
-/// What is left of the lane beside a vehicle of 1.7 m in its middle, m.
-const IN_LANE_M: f64 = 0.95;
 /// So long behind a failure the peak is looked for, s.
 const AFTER_S: f64 = 8.0;
 /// The straight behind the bend, s: for whoever drives by hand, and for the others.
 const BEHIND_S: [f64; 2] = [24.0, 10.0];
 /// An error below this has died down whatever it was before, m.
 const SETTLED_M: f64 = 0.005;
-
-/// What came of one instant, for the two ways to fail.
-#[derive(Debug, Clone)]
-struct Instant {
-    bend: Bend,
-    condition: Condition,
-    takes_over_after_s: f64,
-    side: Side,
-    t_p: f64,
-    at_s: f64,
-    /// The handover's peak and the drop's, and the larger of those without a failure and by hand, m.
-    peaks_m: [f64; 3],
-    left_by_itself: usize,
-}
-
-impl Instant {
-    fn handover(&self) -> f64 {
-        self.peaks_m[0] / self.peaks_m[2]
-    }
-
-    fn drop(&self) -> f64 {
-        self.peaks_m[1] / self.peaks_m[2]
-    }
-
-    fn beside_drop(&self) -> f64 {
-        let [handover, drop, usual] = self.peaks_m;
-        handover.max(usual) / drop.max(usual)
-    }
-
-    fn place(&self) -> Place {
-        Place {
-            speed_kmh: self.bend.speed_kmh,
-            radius_m: self.bend.radius_m,
-            side: self.side,
-            t_p: self.t_p,
-            instant_s: self.at_s - self.bend.begins_s(),
-            place: self.bend.place(self.at_s),
-        }
-    }
-}
-
-/// How many drives the study takes.
-pub fn drives(every_s: f64) -> usize {
-    let of_bend = |bend: &Bend| {
-        let guided = 1 + bend.instants_s(every_s).count() * TAKES_OVER_S.len() * KINDS.len();
-        2 * DRIVERS_T_P.len() * (1 + RELIANCES.len() * guided)
-    };
-    Bend::all().iter().map(of_bend).sum()
-}
-
-/// Drives every bend on all cores; `progress` is called after each drive.
-///
-/// # Errors
-/// As [`haptic_sim::scenario::ScenarioBuilder::build`], none of these scenarios meets one; a run that differs from the shipping
-/// ECU's.
-pub fn study(every_s: f64, progress: impl Fn() + Sync) -> Result<HandoverResults, StudyError> {
-    let bends = Bend::all();
-    let of_bends = bends.iter().map(|bend| instants_of(*bend, every_s, &progress));
-    let instants = of_bends.collect::<Result<Vec<_>, _>>()?.concat();
-    let rows = std::iter::once(None).chain(bends.iter().copied().map(Some));
-    let rows = rows.flat_map(|bend| RELIANCES.map(|condition| (bend, condition)));
-    let rows = rows.flat_map(|(bend, condition)| TAKES_OVER_S.map(|after_s| (bend, condition, after_s)));
-    Ok(HandoverResults {
-        every_s,
-        rows: rows
-            .map(|(bend, condition, after_s)| row(&instants, bend, condition, after_s))
-            .collect(),
-        most_beside_drop: MOST_BESIDE_DROP,
-    })
-}
-
 /// What fails at an instant.
 const KINDS: [FailureKind; 2] = [FailureKind::Input, FailureKind::Torque];
 
-/// A bend's scenarios for one driver to one side: by hand; then each reliance without a failure, and with each failure.
-fn scenarios_of(bend: Bend, side: Side, t_p: f64, every_s: f64) -> Result<Vec<Scenario>, StudyError> {
-    let [by_hand, guided] = BEHIND_S.map(|behind_s| bend.course(side, behind_s));
-    let (by_hand, guided) = (by_hand?, guided?);
-    let build = |condition, kind, time_s, takes_over_after_s| {
-        let is_manual = condition == Condition::Manual;
-        let driver = DriverParameters {
-            t_p,
-            takes_over_after_s,
+/// A driver in a bend to one side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Driver {
+    bend: Bend,
+    side: Side,
+    t_p: f64,
+}
+
+/// How a driver goes through a bend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Way {
+    ByHand,
+    /// With guidance that does not fail.
+    Guided(Condition),
+    Failed {
+        condition: Condition,
+        kind: FailureKind,
+        at_s: f64,
+        takes_over_after_s: f64,
+    },
+}
+
+/// A drive of the study.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    driver: Driver,
+    way: Way,
+    /// Place of the road, of those for who drives by hand and for the others.
+    road: [usize; 2],
+}
+
+/// The study: every bend to both sides with every driver, a failure at instants so far apart.
+#[derive(Debug, Clone)]
+pub struct Handover {
+    every_s: f64,
+    bends: Vec<Bend>,
+    /// By bend and side: for who drives by hand, and for the others.
+    roads: Vec<[Course; 2]>,
+}
+
+impl Handover {
+    /// With instants so far apart.
+    ///
+    /// # Errors
+    /// None of these roads meets one.
+    pub fn new(every_s: f64) -> Result<Self, StudyError> {
+        Self::of_bends(Bend::all(), every_s)
+    }
+
+    fn of_bends(bends: Vec<Bend>, every_s: f64) -> Result<Self, StudyError> {
+        let sides = bends
+            .iter()
+            .flat_map(|bend| [Side::Left, Side::Right].map(|side| (bend, side)));
+        let roads = sides.map(|(bend, side)| -> Result<[Course; 2], StudyError> {
+            let [by_hand, guided] = BEHIND_S.map(|behind_s| bend.course(side, behind_s));
+            Ok([by_hand?, guided?])
+        });
+        let roads = roads.collect::<Result<_, _>>()?;
+        Ok(Self {
+            every_s,
+            bends,
+            roads,
+        })
+    }
+
+    /// A driver's ways through a bend: by hand; then each reliance without a failure, and with each failure.
+    fn ways(&self, bend: Bend) -> Vec<Way> {
+        let mut ways = vec![Way::ByHand];
+        for condition in RELIANCES {
+            ways.push(Way::Guided(condition));
+            for at_s in bend.instants_s(self.every_s) {
+                for takes_over_after_s in TAKES_OVER_S {
+                    ways.extend(KINDS.map(|kind| Way::Failed {
+                        condition,
+                        kind,
+                        at_s,
+                        takes_over_after_s,
+                    }));
+                }
+            }
+        }
+        ways
+    }
+
+    fn scenario(&self, drive: &Drive) -> Result<Scenario, StudyError> {
+        let mut driver = DriverParameters {
+            t_p: drive.driver.t_p,
             ..Default::default()
         };
+        let (condition, kind, time_s) = match drive.way {
+            Way::ByHand => (Condition::Manual, FailureKind::None, 0.0),
+            Way::Guided(condition) => (condition, FailureKind::None, 0.0),
+            Way::Failed {
+                condition,
+                kind,
+                at_s,
+                takes_over_after_s,
+            } => {
+                driver.takes_over_after_s = takes_over_after_s;
+                (condition, kind, at_s)
+            }
+        };
+        let [road, kind_of_road] = drive.road;
         let scenario = Scenario::builder()
-            .course(if is_manual {
-                by_hand.clone()
-            } else {
-                guided.clone()
-            })
-            .speed_kmh(bend.speed_kmh)
+            .course(self.roads[road][kind_of_road].clone())
+            .speed_kmh(drive.driver.bend.speed_kmh)
             .condition(condition)
             .driver(driver)
             .failure(Failure {
@@ -144,26 +162,61 @@ fn scenarios_of(bend: Bend, side: Side, t_p: f64, every_s: f64) -> Result<Vec<Sc
                 time_s,
                 duration_s: None,
             });
-        Ok::<_, StudyError>(scenario.build()?)
-    };
-    let default_s = DriverParameters::default().takes_over_after_s;
-    let mut scenarios = vec![build(Condition::Manual, FailureKind::None, 0.0, default_s)?];
-    for condition in RELIANCES {
-        scenarios.push(build(condition, FailureKind::None, 0.0, default_s)?);
-        for at_s in bend.instants_s(every_s) {
-            for takes_over_after_s in TAKES_OVER_S {
-                for kind in KINDS {
-                    scenarios.push(build(condition, kind, at_s, takes_over_after_s)?);
+        Ok(scenario.build()?)
+    }
+}
+
+impl Study for Handover {
+    type Case = Drive;
+    type Row = Peaks;
+    type Results = HandoverResults;
+
+    fn plan(&self) -> Result<Plan<Drive>, StudyError> {
+        let mut cases = Vec::new();
+        for (place, bend) in self.bends.iter().enumerate() {
+            let ways = self.ways(*bend);
+            for (of_side, side) in [Side::Left, Side::Right].into_iter().enumerate() {
+                for t_p in DRIVERS_T_P {
+                    cases.extend(ways.iter().map(|way| Drive {
+                        driver: Driver {
+                            bend: *bend,
+                            side,
+                            t_p,
+                        },
+                        way: *way,
+                        road: [2 * place + of_side, usize::from(*way != Way::ByHand)],
+                    }));
                 }
             }
         }
+        Ok(Plan::side_by_side(cases, Scenario::default().seed()))
     }
-    Ok(scenarios)
+
+    fn drive(&self, part: &Part<'_, Drive, Peaks>) -> Result<Vec<Peaks>, StudyError> {
+        part.side_by_side(
+            |drive| self.scenario(drive),
+            |drive, scenario, run| Ok(Peaks::new(drive.driver.bend, scenario, run)),
+        )
+    }
+
+    fn summarise(&self, cases: Vec<Drive>, peaks: Vec<Peaks>) -> Result<HandoverResults, StudyError> {
+        let instants = instants(&cases, &peaks);
+        let rows = std::iter::once(None).chain(self.bends.iter().copied().map(Some));
+        let rows = rows.flat_map(|bend| RELIANCES.map(|condition| (bend, condition)));
+        let rows = rows.flat_map(|(bend, condition)| TAKES_OVER_S.map(|after_s| (bend, condition, after_s)));
+        Ok(HandoverResults {
+            every_s: self.every_s,
+            rows: rows
+                .map(|(bend, condition, after_s)| row(&instants, bend, condition, after_s))
+                .collect(),
+            most_beside_drop: MOST_BESIDE_DROP,
+        })
+    }
 }
 
 /// Peaks of a drive, m, and whether the ECU left by itself.
 #[derive(Debug, Clone, Copy)]
-struct Peaks {
+pub struct Peaks {
     /// From the failure on; without one of the whole drive.
     peak_m: f64,
     /// Whether it dies down on the straight behind the bend.
@@ -173,114 +226,17 @@ struct Peaks {
 
 impl Peaks {
     fn new(bend: Bend, scenario: &Scenario, run: &Run) -> Self {
-        let most_m = |from_s: f64, to_s: f64| {
-            let samples = run.trace.samples.iter();
-            let errors_m = samples
-                .filter(|s| (from_s..=to_s).contains(&s.time_s))
-                .map(|s| s.lateral_error_m.abs());
-            if run.diverged() {
-                DIVERGED_M
-            } else {
-                errors_m.fold(0.0, f64::max)
-            }
-        };
         let (ends_s, forever) = (bend.ends_s(), f64::INFINITY);
         let [whole_m, second_half_m] =
-            [0.0, 0.5 * BEHIND_S[0]].map(|behind_s| most_m(ends_s + behind_s, forever));
+            [0.0, 0.5 * BEHIND_S[0]].map(|behind_s| peak_m(run, [ends_s + behind_s, forever]));
+        let failed_at_s = scenario.failure().at_s();
         Self {
-            peak_m: scenario
-                .failure()
-                .at_s()
-                .map_or_else(|| most_m(0.0, forever), |at_s| most_m(at_s, at_s + AFTER_S)),
+            peak_m: peak_m(
+                run,
+                failed_at_s.map_or([0.0, forever], |at_s| [at_s, at_s + AFTER_S]),
+            ),
             settles: second_half_m < (0.9 * whole_m).max(SETTLED_M),
             left_by_itself: Away::new(scenario, &run.trace).is_by_itself(),
         }
     }
-}
-
-/// What came of every instant of a bend, for the drivers who are judged there.
-fn instants_of(bend: Bend, every_s: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<Instant>, StudyError> {
-    let of_sides = [Side::Left, Side::Right].map(|side| DRIVERS_T_P.map(|t_p| (side, t_p)));
-    let drivers = of_sides.concat();
-    let scenarios = drivers
-        .iter()
-        .map(|(side, t_p)| scenarios_of(bend, *side, *t_p, every_s))
-        .collect::<Result<Vec<_>, _>>()?
-        .concat();
-    let peaks = run_all(&scenarios, scenarios[0].seed(), |number, run| {
-        progress();
-        Ok(Peaks::new(bend, &scenarios[number], run))
-    })?;
-    let each = peaks.len() / drivers.len();
-    let of_drivers = drivers.iter().zip(peaks.chunks(each));
-    Ok(of_drivers
-        .flat_map(|((side, t_p), peaks)| instants_of_driver(bend, *side, *t_p, every_s, peaks))
-        .collect())
-}
-
-/// From the drives as [`scenarios_of`] has them.
-fn instants_of_driver(bend: Bend, side: Side, t_p: f64, every_s: f64, peaks: &[Peaks]) -> Vec<Instant> {
-    let (by_hand, guided) = (peaks[0], &peaks[1..]);
-    if !by_hand.settles || by_hand.peak_m > IN_LANE_M {
-        return Vec::new();
-    }
-    let of_reliances = RELIANCES
-        .into_iter()
-        .zip(guided.chunks(guided.len() / RELIANCES.len()));
-    let mut found = Vec::new();
-    for (condition, peaks) in of_reliances {
-        let (nominal, failed) = (peaks[0], peaks[1..].chunks(KINDS.len()));
-        let at = bend
-            .instants_s(every_s)
-            .flat_map(|at_s| TAKES_OVER_S.map(|after_s| (at_s, after_s)));
-        for ((at_s, takes_over_after_s), failed) in at.zip(failed) {
-            let drives = [nominal, failed[0], failed[1]];
-            found.push(Instant {
-                bend,
-                condition,
-                takes_over_after_s,
-                side,
-                t_p,
-                at_s,
-                peaks_m: [
-                    failed[0].peak_m,
-                    failed[1].peak_m,
-                    nominal.peak_m.max(by_hand.peak_m),
-                ],
-                left_by_itself: drives.iter().filter(|drive| drive.left_by_itself).count(),
-            });
-        }
-    }
-    found
-}
-
-fn row(all: &[Instant], bend: Option<Bend>, condition: Condition, takes_over_after_s: f64) -> HandoverRow {
-    let is_here = |instant: &Instant| bend.map_or(!instant.bend.is_papers, |bend| bend == instant.bend);
-    let is_asked = |instant: &&Instant| {
-        is_here(instant) && instant.condition == condition && instant.takes_over_after_s == takes_over_after_s
-    };
-    let instants: Vec<&Instant> = all.iter().filter(is_asked).collect();
-    HandoverRow {
-        bend,
-        condition,
-        takes_over_after_s,
-        instants: instants.len(),
-        handover: figure(&instants, 0, Instant::handover),
-        drop: figure(&instants, 1, Instant::drop),
-        beside_drop: figure(&instants, 0, Instant::beside_drop),
-        left_by_itself: instants.iter().map(|instant| instant.left_by_itself).sum(),
-    }
-}
-
-/// A figure of the drives whose peaks are in this place of an instant's.
-fn figure(instants: &[&Instant], peak: usize, of: impl Fn(&Instant) -> f64) -> Option<Figure> {
-    let mut values: Vec<f64> = instants.iter().map(|instant| of(instant)).collect();
-    values.sort_by(f64::total_cmp);
-    let worst = instants.iter().max_by(|a, b| of(a).total_cmp(&of(b)))?;
-    Some(Figure {
-        worst: of(worst),
-        worst_peak_m: worst.peaks_m[peak],
-        median: values[values.len() / 2],
-        at: worst.place(),
-    })
 }

@@ -18,7 +18,8 @@ use haptic_sim::models::sensors;
 use serde::Serialize;
 
 use super::rows::Rows;
-use crate::availability::{Rate, UNNAMED, Watch};
+use crate::declared::{Listener, UNNAMED};
+use crate::statistics::Rate;
 
 /// Rows further apart are a gap, in which nothing is sent, s.
 const GAP_S: f64 = 0.25;
@@ -164,7 +165,7 @@ pub(super) fn fed(rows: &Rows, feed: Feed, file: &str) -> Fed {
         ..Setup::PAPER
     };
     let mut ecu = Ecu::engaged(&setup, Instant::from_us(0));
-    let mut watch = Watch::new();
+    let mut listener = Listener::new();
     let mut senders = Senders {
         rows,
         feed,
@@ -179,27 +180,27 @@ pub(super) fn fed(rows: &Rows, feed: Feed, file: &str) -> Fed {
     for step in 0..((end_s - start_s) * 1e3) as u32 {
         let time_s = start_s + f64::from(step) * 1e-3;
         let now = Instant::from_us(step.wrapping_mul(1000));
-        let applied = watch.said.map_or(Torque::ZERO, |said| said.torque);
-        for frame in senders.send(step, time_s, watch.engages(), applied) {
+        let applied = listener.said.map_or(Torque::ZERO, |said| said.torque);
+        for frame in senders.send(step, time_s, listener.engages(), applied) {
             // The ECU judges by itself and reports what it misses.
             let _ = ecu.receive(&frame, now);
         }
         let asked = Torque::from_nm(senders.value(&rows.guidance_nm, time_s));
         let out = ecu.step_with_law(now, asked);
         let _ = ecu.background_step();
-        watch.take_frame(time_s, Some(&out.guidance));
+        listener.take_frame(time_s, Some(&out.guidance));
         let part = usize::from(rows.shared[senders.row]);
         steps[part] += 1;
-        if watch.reported.mode == Mode::Active {
+        if listener.reported.mode == Mode::Active {
             guided[part] += 1;
-            let limit = watch.said.map(|said| said.limit);
+            let limit = listener.said.map(|said| said.limit);
             overridden += u32::from(limit == Some(LimitReason::DriverOverride));
         }
-        at_rows.resize(watch.reported.declarations.len(), senders.row);
+        at_rows.resize(listener.reported.declarations.len(), senders.row);
     }
     let hours = |steps: u32| f64::from(steps) / 3.6e6;
     // Without a fault it was the request that ended, or the vehicle was too slow.
-    let ends = watch.reported.declarations.into_iter().zip(at_rows);
+    let ends = listener.reported.declarations.into_iter().zip(at_rows);
     let ends = ends.filter(|(end, _)| end.faults != UNNAMED);
     Fed {
         feed,

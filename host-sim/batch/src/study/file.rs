@@ -1,7 +1,5 @@
 //! A study file, checked: every session's scenario is built before anything is driven.
 
-use std::collections::BTreeSet;
-
 use haptic_sim::input::{InputError, RangeError, parse_toml};
 use haptic_sim::participants::participant;
 use haptic_sim::scenario::{FailureKind, Scenario};
@@ -10,8 +8,8 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{Order, Session, Study, Subject};
-use crate::experiment::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
-use crate::files::{Source, one};
+use crate::files::{Source, check_names, merge, one};
+use crate::paper::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -49,8 +47,6 @@ struct ParticipantFile {
 
 /// Most times that a participant drives under each condition.
 const MOST_REPETITIONS: f64 = 100.0;
-/// Longest name: it becomes the name of a directory.
-const LONGEST_NAME: usize = 40;
 
 pub(super) fn from_text(source: &Source, text: &str) -> Result<Study, InputError> {
     let file: StudyFile = parse_toml(&source.name, text)?;
@@ -88,30 +84,6 @@ pub(super) fn from_text(source: &Source, text: &str) -> Result<Study, InputError
         sessions,
         notes,
     })
-}
-
-pub(crate) fn check_names<'a>(
-    source: &Source,
-    what: &str,
-    names: impl IntoIterator<Item = &'a String>,
-) -> Result<(), InputError> {
-    let mut seen = BTreeSet::new();
-    for name in names {
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) {
-            return Err(source.bad(format!(
-                "{what} {name:?}: a name is 1 to {LONGEST_NAME} letters, digits, - and _, for a directory bears it"
-            )));
-        }
-        // Some disks do not tell large letters from small ones.
-        if !seen.insert(name.to_lowercase()) {
-            return Err(source.bad(format!("{what} {name:?} is there twice")));
-        }
-    }
-    if seen.is_empty() {
-        return Err(source.bad(format!("there is no [[{what}]]")));
-    }
-    Ok(())
 }
 
 /// The session of a participant under a condition, in the first place.
@@ -202,17 +174,4 @@ fn of_published(number: u32, manual: bool) -> Result<Table, RangeError> {
         }
     }
     Ok(fields)
-}
-
-/// Puts fields over others, tables field by field.
-pub(crate) fn merge(into: &mut Table, over: &Table) {
-    for (name, value) in over {
-        match (into.get_mut(name), value) {
-            // A course is one value.
-            (Some(Value::Table(old)), Value::Table(new)) if name != "course" => merge(old, new),
-            _ => {
-                into.insert(name.clone(), value.clone());
-            }
-        }
-    }
 }

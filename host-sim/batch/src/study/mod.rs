@@ -20,19 +20,18 @@ use std::path::Path;
 
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::{Condition, Scenario};
-use rayon::prelude::*;
+use haptic_sim::simulation::Run;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use file::{check_names, merge};
 pub use order::Order;
-pub(crate) use paired::interval_of_mean;
 pub use paired::{Difference, of_participants};
 
+use crate::engine::{Watch, each, runs};
 use crate::error::{StudyError, refuse};
 use crate::files;
 use crate::left_by_themselves;
 use crate::record::RunRecord;
-use crate::vectorised::run_all;
+use crate::statistics::Confidence;
 
 /// A study, checked.
 #[derive(Debug, Clone)]
@@ -123,6 +122,9 @@ pub struct StudyResults {
     pub conditions: Vec<String>,
     /// Every session, in order.
     pub sessions: Vec<SessionResult>,
+    /// How often intervals hold what they are of.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
     /// How much the conditions differ, participant by participant.
     pub differences: Vec<Difference>,
     /// What a reader has to know.
@@ -210,21 +212,16 @@ impl Study {
         Ok(session)
     }
 
-    /// Drives the simulated sessions that are missing; `done` is called after each, from any thread. What is recorded in `out` is
-    /// checked first: with another session in a place nothing is driven.
+    /// Drives the simulated sessions that are missing, on all cores. What is recorded in `out` is checked first: with another session in a place nothing is driven.
     ///
     /// # Errors
     /// A place with another session in it; what the disk says; a drive that differs from the shipping ECU's.
-    pub fn run(&self, out: &Path, done: impl Fn() + Sync) -> Result<(), StudyError> {
+    pub fn run(&self, out: &Path, watch: &Watch<'_>) -> Result<(), StudyError> {
         let missing = self.missing(out)?;
-        let scenarios: Vec<Scenario> = missing.iter().map(|session| session.scenario.clone()).collect();
-        let seed = scenarios.first().map_or(0, Scenario::seed);
-        run_all(&scenarios, seed, |number, run| {
-            store::keep_run(self, missing[number], out, run)?;
-            done();
-            Ok(())
-        })
-        .map(drop)
+        let seed = missing.first().map_or(0, |session| session.scenario.seed());
+        let scenario = |session: &&Session| Ok(session.scenario.clone());
+        let keep = |session: &&Session, _: &Scenario, run: &Run| store::keep_run(self, session, out, run);
+        runs(&missing, seed, watch, scenario, keep).map(drop)
     }
 
     /// Simulated sessions that are not recorded yet.
@@ -242,11 +239,11 @@ impl Study {
         Ok(missing)
     }
 
-    /// What is recorded, measured from the recordings alone.
+    /// What is recorded, measured from the recordings alone, with intervals of a level.
     ///
     /// # Errors
     /// A recording that cannot be read, or is another session's.
-    pub fn results(&self, out: &Path) -> Result<StudyResults, StudyError> {
+    pub fn results(&self, out: &Path, level: Confidence) -> Result<StudyResults, StudyError> {
         let result = |session: &Session| -> Result<SessionResult, StudyError> {
             let found = store::read(self, session, out)?;
             Ok(SessionResult {
@@ -263,11 +260,7 @@ impl Study {
                 }),
             })
         };
-        let sessions = self
-            .sessions
-            .par_iter()
-            .map(result)
-            .collect::<Result<Vec<_>, _>>()?;
+        let sessions = each(&self.sessions, &Watch::nobody(), result)?;
         let mut notes = self.notes.clone();
         let guided = sessions.iter().filter_map(|s| {
             let recorded = s.recorded.as_ref()?;
@@ -297,7 +290,8 @@ impl Study {
         Ok(StudyResults {
             study: self.name.clone(),
             conditions: self.conditions.clone(),
-            differences: paired::differences(&self.conditions, &sessions),
+            level,
+            differences: paired::differences(&self.conditions, &sessions, level),
             sessions,
             notes,
         })

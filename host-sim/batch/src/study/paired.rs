@@ -7,10 +7,9 @@
 
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::SessionResult;
-use crate::statistics::mean;
+use crate::statistics::{Confidence, Mean, deviation, mean};
 
 /// One metric under two conditions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,10 +24,9 @@ pub struct Difference {
     pub to: String,
     /// Participants with a value under both.
     pub participants: usize,
-    /// Mean of the differences.
-    pub mean: f64,
-    /// Its 95 % interval, not corrected for the number of metrics and pairs; none of a single participant.
-    pub interval_95: Option<[f64; 2]>,
+    /// Mean of the differences; its interval is not corrected for the number of metrics and pairs.
+    #[serde(flatten)]
+    pub mean: Mean,
     /// d_z; none of a single participant, or where all differences are the same.
     pub effect_size: Option<f64>,
 }
@@ -50,7 +48,11 @@ pub fn of_participants(sessions: &[SessionResult], condition: &str, metric: &Def
 }
 
 /// The differences of every pair of conditions, later minus earlier, in every metric that has values.
-pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> Vec<Difference> {
+pub(super) fn differences(
+    conditions: &[String],
+    sessions: &[SessionResult],
+    level: Confidence,
+) -> Vec<Difference> {
     let mut all = Vec::new();
     for (place, from) in conditions.iter().enumerate() {
         for to in &conditions[place + 1..] {
@@ -60,7 +62,7 @@ pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> 
                 let found: Vec<f64> = pairs
                     .filter_map(|(before, after)| Some(after? - before?))
                     .collect();
-                let (mean, interval_95, effect_size) = paired(&found)?;
+                let mean = Mean::new(&found, level)?;
                 Some(Difference {
                     metric: metric.name,
                     unit: metric.unit,
@@ -68,8 +70,7 @@ pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> 
                     to: to.clone(),
                     participants: found.len(),
                     mean,
-                    interval_95,
-                    effect_size,
+                    effect_size: effect_size(&found, mean.mean),
                 })
             }));
         }
@@ -77,50 +78,39 @@ pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> 
     all
 }
 
-/// Mean and its 95 % interval, Student's; none of a single value.
-pub(crate) fn interval_of_mean(values: &[f64]) -> Option<(f64, Option<[f64; 2]>)> {
-    paired(values).map(|(mean, interval, _)| (mean, interval))
-}
-
-/// Mean, its interval and d_z of differences.
-fn paired(differences: &[f64]) -> Option<(f64, Option<[f64; 2]>, Option<f64>)> {
-    let mean = mean(differences.iter().copied())?;
-    let freedom = differences.len() as f64 - 1.0;
-    let square: f64 = differences.iter().map(|value| (value - mean).powi(2)).sum();
-    let deviation = (square / freedom).sqrt();
-    let t = StudentsT::new(0.0, 1.0, freedom)
-        .ok()
-        .map(|t| t.inverse_cdf(0.975));
-    let interval = t.map(|t| {
-        let margin = t * deviation / (freedom + 1.0).sqrt();
-        [mean - margin, mean + margin]
-    });
-    Some((mean, interval, (deviation > 0.0).then(|| mean / deviation)))
+/// d_z of differences with this mean.
+fn effect_size(differences: &[f64], mean: f64) -> Option<f64> {
+    let deviation = deviation(differences, mean)?;
+    (deviation > 0.0).then(|| mean / deviation)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::paired;
+    use super::*;
 
     /// SciPy 1.17.1: `r = stats.ttest_rel(a, b); r.confidence_interval(0.95)` of a = 1.2, 0.8, 1.5, 0.9, 1.1 and
     /// b = 1.0, 0.9, 1.1, 0.7, 1.0.
     #[test]
     fn agrees_with_scipy() {
-        let (mean, interval, effect) = paired(&[0.2, -0.1, 0.4, 0.2, 0.1]).unwrap();
-        let [low, high] = interval.unwrap();
+        let differences = [0.2, -0.1, 0.4, 0.2, 0.1];
+        let mean = Mean::new(&differences, Confidence::USUAL).unwrap();
+        let [low, high] = mean.interval.unwrap();
         for (value, expected) in [
-            (mean, 0.16),
+            (mean.mean, 0.16),
             (low, -0.065_559_466_629_904),
             (high, 0.385_559_466_629_904),
-            (effect.unwrap(), 0.880_771_012_101_088),
+            (
+                effect_size(&differences, mean.mean).unwrap(),
+                0.880_771_012_101_088,
+            ),
         ] {
             assert!((value - expected).abs() < 1e-9, "{value} instead of {expected}");
         }
     }
 
     #[test]
-    fn of_one_participant_there_is_no_interval() {
-        assert_eq!(paired(&[0.5]), Some((0.5, None, None)));
-        assert_eq!(paired(&[]), None);
+    fn one_participant_has_no_effect_size_and_nor_have_equal_differences() {
+        assert_eq!(effect_size(&[0.5], 0.5), None);
+        assert_eq!(effect_size(&[0.5, 0.5], 0.5), None);
     }
 }

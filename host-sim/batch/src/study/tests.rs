@@ -1,9 +1,12 @@
 //! What is refused, and that nothing recorded is lost.
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::*;
+use crate::engine::{Progress, Watch};
 use crate::files;
 
 const STUDY: &str = r#"
@@ -36,6 +39,10 @@ fn study(text: &str) -> Result<Study, String> {
     file::from_text(&files::Source::new("study.toml", Path::new("")), text).map_err(|e| e.to_string())
 }
 
+fn results(study: &Study, out: &Path) -> StudyResults {
+    study.results(out, Confidence::USUAL).unwrap()
+}
+
 #[test]
 fn a_session_is_the_run_of_its_scenario() {
     let out = tempfile::tempdir().unwrap();
@@ -46,8 +53,8 @@ fn a_session_is_the_run_of_its_scenario() {
         ["manual", "guided", "guided", "manual", "manual", "guided"]
     );
     assert_eq!(study.notes.len(), 1, "three participants share two orders");
-    study.run(out.path(), || ()).unwrap();
-    let results = study.results(out.path()).unwrap();
+    study.run(out.path(), &Watch::nobody()).unwrap();
+    let results = results(&study, out.path());
     let recorded: Vec<bool> = results.sessions.iter().map(|s| s.recorded.is_some()).collect();
     assert_eq!(recorded, [true, true, true, true, false, false]);
     let seeds: std::collections::BTreeSet<u64> = results.sessions.iter().map(|s| s.seed).collect();
@@ -88,24 +95,24 @@ fn a_session_is_the_run_of_its_scenario() {
 fn a_study_goes_on_and_overwrites_nothing() {
     let out = tempfile::tempdir().unwrap();
     let first = study(STUDY).unwrap();
-    first.run(out.path(), || ()).unwrap();
+    first.run(out.path(), &Watch::nobody()).unwrap();
     let kept = out.path().join("sessions/P02/1-guided");
     let before = fs::read(kept.join("drive.csv")).unwrap();
     fs::remove_dir_all(out.path().join("sessions/P01/1-manual")).unwrap();
-    let driven = std::sync::atomic::AtomicU32::new(0);
-    first
-        .run(out.path(), || {
-            driven.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        })
-        .unwrap();
+    let driven = AtomicU64::new(0);
+    let hear = |progress: Progress| {
+        driven.store(progress.done, Ordering::Relaxed);
+        ControlFlow::Continue(())
+    };
+    first.run(out.path(), &Watch::new(&hear)).unwrap();
     assert_eq!(driven.into_inner(), 1, "only what was missing");
     // A participant more changes nothing of the others.
     let more = study(&format!(
         "{STUDY}[[participant]]\nname = \"P04\"\npublished = 4\n"
     ))
     .unwrap();
-    more.run(out.path(), || ()).unwrap();
-    assert!(more.results(out.path()).unwrap().sessions[7].recorded.is_some());
+    more.run(out.path(), &Watch::nobody()).unwrap();
+    assert!(results(&more, out.path()).sessions[7].recorded.is_some());
     // Another seed, speed or name is another study.
     for (from, to, says) in [
         ("seed = 7", "seed = 8", "another scenario or seed"),
@@ -118,7 +125,7 @@ fn a_study_goes_on_and_overwrites_nothing() {
     ] {
         let error = study(&STUDY.replace(from, to))
             .unwrap()
-            .run(out.path(), || ())
+            .run(out.path(), &Watch::nobody())
             .unwrap_err()
             .to_string();
         assert!(error.contains(says) && error.contains("P01"), "{error}");
@@ -187,7 +194,7 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
         .to_string();
     assert!(error.contains("2-guided is recorded already"), "{error}");
     assert_eq!(fs::read_to_string(place.join("drive.csv")).unwrap(), text);
-    let results = study.results(out.path()).unwrap();
+    let results = results(&study, out.path());
     assert_eq!(
         results.sessions[5].recorded.as_ref().unwrap().source,
         Source::Imported
@@ -259,8 +266,8 @@ fn repetitions_are_blocks_with_orders_and_seeds_of_their_own() {
         .unwrap_err()
         .to_string();
     assert!(missing.contains("P03/guided, P03/guided/2"), "{missing}");
-    twice.run(out.path(), || ()).unwrap();
-    let results = twice.results(out.path()).unwrap();
+    twice.run(out.path(), &Watch::nobody()).unwrap();
+    let results = results(&twice, out.path());
     let peak = |participant: &str, condition: &str| {
         let own = results
             .sessions
@@ -290,7 +297,7 @@ fn repetitions_are_blocks_with_orders_and_seeds_of_their_own() {
         (found.from.as_str(), found.to.as_str(), found.participants),
         ("manual", "guided", 2)
     );
-    assert!((found.mean - (expected[0] + expected[1]) / 2.0).abs() < 1e-12);
+    assert!((found.mean.mean - (expected[0] + expected[1]) / 2.0).abs() < 1e-12);
 }
 
 #[test]

@@ -4,8 +4,8 @@
 use haptic_sim::seeds::{self, Stream};
 
 use super::file::Design;
-use super::sobol::{DIMENSIONS, Dimension};
 use crate::error::{StudyError, refuse};
+use crate::sobol::{DIMENSIONS, Dimension};
 
 /// Most slices of a Latin hypercube: they are kept in memory.
 const MOST_SLICES: u64 = 20_000_000;

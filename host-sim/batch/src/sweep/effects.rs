@@ -8,8 +8,10 @@
 use haptic_analysis::metrics::Definition;
 use serde::Serialize;
 
-use super::groups::{CONFIDENCE, Drives, Group, Moments, share_between, student};
-use super::{DesignPoint, Driven, SLICES, Sweep, units, value};
+use super::groups::{Drives, Group, Moments, share_between};
+use super::{DesignPoint, Driven, SLICES, Sweep, units};
+use crate::engine::{number, text};
+use crate::statistics::{Confidence, student};
 
 /// Whether a small value of a metric is the bad one.
 pub(super) fn small_is_bad(metric: &Definition) -> bool {
@@ -73,6 +75,7 @@ pub(super) struct Effects<'a> {
     sweep: &'a Sweep,
     axes: Vec<Axis>,
     judge: usize,
+    confidence: Confidence,
     /// Repeats that are observations of their own.
     apart: u64,
     /// The sample under way.
@@ -102,7 +105,7 @@ struct Sums {
 }
 
 impl<'a> Effects<'a> {
-    pub(super) fn new(sweep: &'a Sweep, judge: usize) -> Self {
+    pub(super) fn new(sweep: &'a Sweep, judge: usize, level: Confidence) -> Self {
         let mut column = 0;
         let axis = |axis: &super::axis::Axis| {
             let of_list = axis.rows().map(<[_]>::len);
@@ -123,6 +126,7 @@ impl<'a> Effects<'a> {
             sweep,
             axes: sweep.axes().map(axis).collect(),
             judge,
+            confidence: level,
             apart: if sweep.samples > 1 {
                 1
             } else {
@@ -130,6 +134,10 @@ impl<'a> Effects<'a> {
             },
             sample: 0,
         }
+    }
+
+    pub(super) fn confidence(&self) -> Confidence {
+        self.confidence
     }
 
     /// Drives come in the order of their numbers.
@@ -159,9 +167,9 @@ impl<'a> Effects<'a> {
             let sums = &mut axis.levels[level];
             let own = &point.values[axis.column];
             if axis.exact && sums.label.is_none() {
-                sums.label = Some(value::text(own));
+                sums.label = Some(text(own));
             }
-            if let Some(x) = value::number(own) {
+            if let Some(x) = number(own) {
                 sums.x.add(x);
             }
             for (moments, value) in sums.metrics.iter_mut().zip(&driven.metrics) {
@@ -206,7 +214,7 @@ impl<'a> Effects<'a> {
         });
         let compared = |(part, label): (&Group, &String)| Compared {
             label: label.clone(),
-            drives: part.finish(has_limit),
+            drives: part.finish(has_limit, self.confidence),
         };
         let effect = |(place, axis): (usize, &Axis)| {
             let labels = if self.sweep.compare == Some(place) {
@@ -219,7 +227,7 @@ impl<'a> Effects<'a> {
             let level = |level: &Sums| Level {
                 label: level.label(),
                 x: level.x.mean(),
-                drives: level.all.finish(has_limit),
+                drives: level.all.finish(has_limit, self.confidence),
                 compared: level.compared.iter().zip(labels).map(compared).collect(),
             };
             Effect {
@@ -232,7 +240,7 @@ impl<'a> Effects<'a> {
                     .filter(|level| level.all.drives > 0)
                     .map(level)
                     .collect(),
-                best: axis.best(has_limit, small_is_bad(self.sweep.judge)),
+                best: axis.best(has_limit, self.confidence, small_is_bad(self.sweep.judge)),
                 shares: (self.sweep.metrics.iter().enumerate())
                     .map(|(i, metric)| (metric.name, of_variance(i)))
                     .collect(),
@@ -252,7 +260,7 @@ impl Sums {
 
 impl Axis {
     /// As [`Effect::best`] says.
-    fn best(&self, has_limit: bool, small_is_bad: bool) -> Vec<String> {
+    fn best(&self, has_limit: bool, level: Confidence, small_is_bad: bool) -> Vec<String> {
         let driven: Vec<usize> = (0..self.levels.len())
             .filter(|i| self.levels[*i].all.drives > 0)
             .collect();
@@ -273,10 +281,10 @@ impl Axis {
             return Vec::new();
         };
         // Each of the others might seem different by chance.
-        let certainty = 1.0 - (1.0 - CONFIDENCE) / (2.0 * (driven.len() as f64 - 1.0).max(1.0));
+        let certainty = 1.0 - (1.0 - level.share()) / (2.0 * (driven.len() as f64 - 1.0).max(1.0));
         let apart = |i: usize| {
             if has_limit {
-                self.shares_differ(i, least)
+                self.shares_differ(i, least, level)
             } else {
                 self.means_differ(i, least, certainty)
             }
@@ -293,8 +301,8 @@ impl Axis {
     }
 
     /// Whether the intervals of two shares lie apart.
-    fn shares_differ(&self, i: usize, j: usize) -> bool {
-        let [i, j] = [i, j].map(|level| self.levels[level].all.finish(true).beyond_interval);
+    fn shares_differ(&self, i: usize, j: usize, level: Confidence) -> bool {
+        let [i, j] = [i, j].map(|place| self.levels[place].all.finish(true, level).beyond_interval);
         i.zip(j)
             .is_some_and(|([low, high], [other_low, other_high])| low > other_high || other_low > high)
     }
@@ -326,6 +334,7 @@ impl Axis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::Watch;
 
     /// Counted again from the rows of the table.
     #[test]
@@ -337,8 +346,8 @@ mod tests {
         );
         let folder = tempfile::tempdir().unwrap();
         let store = crate::sweep::Store::open(&sweep, "test 1", folder.path()).unwrap();
-        crate::sweep::run_all(&store, &sweep, crate::sweep::Shard::WHOLE, Some(1), |_| ()).unwrap();
-        let summary = store.finish().unwrap();
+        crate::sweep::run_all(&store, &sweep, crate::sweep::Shard::WHOLE, &Watch::nobody()).unwrap();
+        let summary = store.finish(Confidence::USUAL).unwrap();
         assert_eq!(summary.compare.as_deref(), Some("failure.kind"));
         let csv = std::fs::read_to_string(folder.path().join("drives.csv")).unwrap();
         let heads: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
@@ -381,7 +390,7 @@ mod tests {
     fn effects_of(text: &str, vary: &str, peak: impl Fn(&DesignPoint) -> Option<f64>) -> Vec<Effect> {
         let text = format!("metrics = [\"peak_lateral_error_m\"]\n{text}");
         let sweep = crate::sweep::tests::with_road(&text, vary);
-        let mut effects = Effects::new(&sweep, 0);
+        let mut effects = Effects::new(&sweep, 0, Confidence::USUAL);
         for drive in 0..sweep.drives() {
             let point = sweep.point(drive);
             let peak = peak(&point);

@@ -1,13 +1,9 @@
 //! Drives that belong together: their metrics' moments, and the intervals that follow from them.
 
-use haptic_sim::share::wilson;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::Driven;
-
-/// What intervals hold, and what a difference has to be certain by.
-pub(super) const CONFIDENCE: f64 = 0.95;
+use crate::statistics::{Confidence, wilson};
 
 /// What came of some drives.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,11 +15,11 @@ pub struct Drives {
     pub diverged: u64,
     /// Mean of the metric that judges.
     pub mean: Option<f64>,
-    /// Its 95 % interval (Student), if there are two observations.
+    /// Its interval (Student), if there are two observations.
     pub interval: Option<[f64; 2]>,
     /// Share of the drives beyond the limit, if there is one.
     pub beyond: Option<f64>,
-    /// Its 95 % interval (Wilson).
+    /// Its interval (Wilson).
     pub beyond_interval: Option<[f64; 2]>,
 }
 
@@ -97,11 +93,11 @@ impl Group {
         }
     }
 
-    pub(super) fn finish(&self, has_limit: bool) -> Drives {
+    pub(super) fn finish(&self, has_limit: bool, level: Confidence) -> Drives {
         let mean = self.judged.mean();
         let around = |mean: f64| {
             let (variance, free) = self.observed.of_mean()?;
-            let half = student(0.5 + 0.5 * CONFIDENCE, free) * variance.sqrt();
+            let half = level.student(free) * variance.sqrt();
             Some([mean - half, mean + half])
         };
         let beyond = (has_limit && self.drives > 0).then(|| self.beyond as f64 / self.drives as f64);
@@ -111,13 +107,9 @@ impl Group {
             mean,
             interval: mean.and_then(around),
             beyond,
-            beyond_interval: beyond.map(|share| wilson(share, self.observations as f64)),
+            beyond_interval: beyond.map(|share| wilson(share, self.observations as f64, level)),
         }
     }
-}
-
-pub(super) fn student(share: f64, free: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, free).map_or(f64::INFINITY, |law| law.inverse_cdf(share))
 }
 
 /// Epsilon squared of groups: (SSB - (k - 1) MSW) / SST, not below zero.
@@ -141,6 +133,7 @@ pub(super) fn share_between(groups: impl Iterator<Item = Moments> + Clone) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::student;
 
     fn group(values: &[f64]) -> Moments {
         let mut moments = Moments::default();

@@ -23,25 +23,25 @@ mod point;
 mod resolve;
 mod run;
 mod saltelli;
-pub(crate) mod sobol;
 mod store;
 mod summary;
 mod table;
 #[cfg(test)]
 mod tests;
 mod units;
-pub(crate) mod value;
+mod value;
 mod vary;
 mod vectorised;
 
+pub use crate::error::StoreError;
 pub use chunk::Chunk;
 pub use drive::Driven;
 pub use effects::{Compared, Effect, Level};
 pub use file::{Design, Stop};
 pub use groups::Drives;
-pub use run::{Progress, Shard, run_all};
+pub use run::{Shard, run_all};
 pub use saltelli::SobolIndex;
-pub use store::{Store, StoreError};
+pub use store::Store;
 pub use summary::{Distribution, Summary, Worst};
 
 use std::collections::BTreeMap;

@@ -7,6 +7,7 @@ use toml::Value;
 
 use super::axis::Kind;
 use super::{Design, DesignPoint, MOST_DRIVES, SLICES, Sweep, value};
+use crate::engine::{number, text};
 use crate::error::StudyError;
 
 impl Sweep {
@@ -61,10 +62,10 @@ impl Sweep {
             let mut named = columns()
                 .zip(&point.values)
                 .filter(|(column, _)| column.name == name);
-            named.next().and_then(|(_, value)| value::number(value))
+            named.next().and_then(|(_, value)| number(value))
         };
         for (column, value) in columns().zip(&point.values) {
-            let applied = match (&column.over, value::number(value)) {
+            let applied = match (&column.over, number(value)) {
                 (None, Some(number)) if column.times != 1.0 => Value::Float(column.times * number),
                 (Some(over), Some(number)) => {
                     let over =
@@ -104,7 +105,7 @@ impl Sweep {
             let varied: Vec<String> = self
                 .columns()
                 .zip(&point.values)
-                .map(|(name, value)| format!("{name} = {}", value::text(value)))
+                .map(|(name, value)| format!("{name} = {}", text(value)))
                 .collect();
             let message = error.to_string();
             // The parser's place in a text that nobody wrote helps nobody.

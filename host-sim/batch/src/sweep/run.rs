@@ -1,14 +1,13 @@
-//! A shard's chunks on threads, with progress; and when enough is known.
+//! A shard's chunks as a study of the engine; and when enough is known.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
 
-use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::groups::Moments;
 use super::{Chunk, Store, Sweep};
-use crate::compare::on_threads;
+use crate::engine::{self, Part, Plan, Study, Watch};
 use crate::error::{StudyError, refuse};
 
 /// A part of a sweep: every n-th chunk.
@@ -52,74 +51,88 @@ impl std::str::FromStr for Shard {
     }
 }
 
-/// How far a shard is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
-    /// Drives that are done now.
-    pub done: u64,
-    /// Of these, drives that an earlier start did.
-    pub before: u64,
-    /// Drives of the shard.
-    pub all: u64,
+/// The chunks of a shard.
+struct Chunks<'a> {
+    store: &'a Store<'a>,
+    sweep: &'a Sweep,
+    shard: Shard,
 }
 
-/// Drives what is missing of a shard on so many threads, none: one a core; `progress` is called behind each chunk.
+/// Drives what is missing of a shard on every core.
 ///
 /// # Errors
 /// A drive that cannot be; what the disk says. Chunks that were finished stay.
-pub fn run_all(
-    store: &Store,
-    sweep: &Sweep,
-    shard: Shard,
-    threads: Option<u32>,
-    progress: impl Fn(Progress) + Sync,
-) -> Result<(), StudyError> {
-    let count = |chunk: u64| {
-        let drives = sweep.drives_of(chunk);
-        drives.end - drives.start
+pub fn run_all(store: &Store<'_>, sweep: &Sweep, shard: Shard, watch: &Watch<'_>) -> Result<(), StudyError> {
+    let prefix = Prefix {
+        watch: Enough::new(sweep),
+        next: 0,
     };
-    let all = (0..sweep.chunks())
-        .filter(|chunk| shard.has(*chunk))
-        .map(count)
-        .sum();
-    let missing = store.missing(shard);
-    let before = all - missing.iter().copied().map(count).sum::<u64>();
-    let begin = Progress {
-        done: before,
-        before,
-        all,
+    let kept = Kept {
+        store,
+        prefix: sweep.stop.is_some().then(|| Mutex::new(prefix)),
     };
-    progress(begin);
-    let state = Mutex::new((
-        begin,
-        Prefix {
-            watch: Watch::new(sweep),
-            next: 0,
-        },
-    ));
-    let is_enough = AtomicBool::new(false);
-    let drive = |number: u64| -> Result<(), StudyError> {
-        if is_enough.load(Ordering::Relaxed) {
-            return Ok(());
-        }
-        let chunk = sweep.run_chunk(number)?;
-        store.put(number, &chunk.to_bytes(store.fingerprint()))?;
-        let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-        let (now, prefix) = &mut *state;
-        now.done += chunk.rows.len() as u64;
-        progress(*now);
-        if sweep.stop.is_some() && prefix.advance(store) {
-            is_enough.store(true, Ordering::Relaxed);
-        }
+    let chunks = Chunks { store, sweep, shard };
+    engine::run(&chunks, &kept, watch)
+}
+
+/// A row would be a chunk, which is on the disk by then: all of them may be more than memory holds.
+impl Study for Chunks<'_> {
+    type Case = u64;
+    type Row = ();
+    type Results = ();
+
+    fn plan(&self) -> Result<Plan<u64>, StudyError> {
+        let mine = (0..self.sweep.chunks()).filter(|chunk| self.shard.has(*chunk));
+        Ok(Plan::one_by_one(mine.collect()))
+    }
+
+    fn drive(&self, part: &Part<'_, u64, ()>) -> Result<Vec<()>, StudyError> {
+        part.one_by_one(|number| {
+            let chunk = self.sweep.run_chunk(*number)?;
+            Ok(self
+                .store
+                .put(*number, &chunk.to_bytes(self.store.fingerprint()))?)
+        })
+    }
+
+    fn summarise(&self, _: Vec<u64>, _: Vec<()>) -> Result<(), StudyError> {
         Ok(())
-    };
-    let chunks = missing.into_iter().par_bridge();
-    on_threads(threads, || chunks.try_for_each(drive)).map_err(|e| e.to_string())?
+    }
+
+    fn drives(&self, number: &u64) -> u64 {
+        let drives = self.sweep.drives_of(*number);
+        drives.end - drives.start
+    }
+}
+
+/// Chunks on the disk, and whether enough is known by them.
+struct Kept<'a> {
+    store: &'a Store<'a>,
+    /// None of a sweep that goes to its end.
+    prefix: Option<Mutex<Prefix>>,
+}
+
+impl engine::Store<u64, ()> for Kept<'_> {
+    fn kept(&self, number: &u64) -> Result<Option<()>, StudyError> {
+        Ok(self.store.get(*number).map(|_| ()))
+    }
+
+    fn keep(&self, _: &u64, (): &()) -> Result<ControlFlow<()>, StudyError> {
+        let Some(prefix) = &self.prefix else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        let mut prefix = prefix.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(if prefix.advance(self.store) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
+    }
 }
 
 /// The chunks from the first on without a gap, whoever drove them.
 struct Prefix {
-    watch: Watch,
+    watch: Enough,
     next: u64,
 }
 
@@ -138,7 +151,7 @@ impl Prefix {
 /// The mean of a metric over samples, chunk by chunk in order: whether it is known well enough. A sample's drives
 /// (grid and repeats) count as one observation, their mean: they are not independent of each other.
 #[derive(Debug, Clone)]
-pub(super) struct Watch {
+pub(super) struct Enough {
     metric: Option<usize>,
     half_width: f64,
     quantile: f64,
@@ -150,7 +163,7 @@ pub(super) struct Watch {
     observed: Moments,
 }
 
-impl Watch {
+impl Enough {
     pub(super) fn new(sweep: &Sweep) -> Self {
         let stop = sweep.stop.as_ref();
         let standard = Normal::standard();

@@ -8,13 +8,13 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use haptic_sim::input::InputError;
-
 use super::chunk::checksum;
 use super::summary::Summarised;
-use super::table::Tables;
-use super::{Chunk, Driven, Shard, Summary, Sweep};
-use crate::sweep::run::Watch;
+use super::table::{columns, entries};
+use super::{Chunk, Driven, Shard, StoreError, Summary, Sweep};
+use crate::engine::Tables;
+use crate::statistics::Confidence;
+use crate::sweep::run::Enough;
 
 /// A sweep's directory.
 #[derive(Debug)]
@@ -23,33 +23,6 @@ pub struct Store<'a> {
     version: String,
     directory: PathBuf,
     fingerprint: u64,
-}
-
-/// Why a directory cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum StoreError {
-    /// A file cannot be read or written.
-    #[error(transparent)]
-    File(InputError),
-    /// The directory holds another sweep, or one of another program.
-    #[error(
-        "{} holds another sweep, or one that another version of the program began; give another --out, or remove it",
-        .0.display()
-    )]
-    Another(PathBuf),
-    /// Chunks are missing: how many, and of how many.
-    #[error("{0} of {1} chunks are missing: other shards have not driven them yet")]
-    Missing(u64, u64),
-    /// Bytes that are no chunk of this sweep.
-    #[error("chunk {0}: these bytes are no chunk of this sweep")]
-    Corrupted(u64),
-}
-
-impl StoreError {
-    fn file(path: &Path, error: impl std::fmt::Display) -> Self {
-        Self::File(InputError::new(path.display(), error))
-    }
 }
 
 impl<'a> Store<'a> {
@@ -158,18 +131,23 @@ impl<'a> Store<'a> {
         path.with_file_name(name)
     }
 
-    /// Makes the table of all drives, or of an early stop's, and their summary.
+    /// Makes the table of all drives, or of an early stop's, and their summary with intervals of a level.
     ///
     /// # Errors
     /// Chunks that are missing; what the disk says.
-    pub fn finish(&self) -> Result<Summary, StoreError> {
+    pub fn finish(&self, level: Confidence) -> Result<Summary, StoreError> {
         let all = self.sweep.chunks();
-        let mut watch = Watch::new(self.sweep);
-        let (mut summary, mut end) = (Summarised::new(self.sweep), None);
+        let mut watch = Enough::new(self.sweep);
+        let (mut summary, mut end) = (Summarised::new(self.sweep, level), None);
         let places = ["drives.csv", "drives.parquet"].map(|name| self.directory.join(name));
         let beside = places.each_ref().map(|path| self.beside(path));
+        // The whole sweep and the scenario that it varies are in the file, so that a row says with its file what was driven.
+        let metadata = [
+            ("haptic.version", &*self.version),
+            ("haptic.sweep", self.sweep.text()),
+        ];
         let mut tables =
-            Tables::create(self.sweep, &self.version, &beside).map_err(|e| self.table_error(e))?;
+            Tables::create(columns(self.sweep), &metadata, &beside).map_err(|e| self.table_error(e))?;
         for number in 0..all {
             let Some(chunk) = self.get(number) else {
                 for path in &beside {
@@ -181,7 +159,9 @@ impl<'a> Store<'a> {
             for (drive, driven) in self.sweep.drives_of(number).zip(&chunk.rows) {
                 let point = self.sweep.point(drive);
                 summary.add(&point, driven);
-                tables.row(&point, driven).map_err(|e| self.table_error(e))?;
+                tables
+                    .row(entries(&point, driven, &self.version))
+                    .map_err(|e| self.table_error(e))?;
             }
             if watch.add(&chunk) {
                 end = Some(self.sweep.drives_of(number).end);

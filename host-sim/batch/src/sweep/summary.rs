@@ -9,8 +9,10 @@ use serde::Serialize;
 use super::effects::{Effects, small_is_bad};
 use super::groups::Moments;
 use super::saltelli::{Blocks, SobolIndex};
-use super::{Design, DesignPoint, Driven, Effect, Sweep, value};
+use super::{Design, DesignPoint, Driven, Effect, Sweep};
 use crate::Away;
+use crate::engine::text;
+use crate::statistics::Confidence;
 
 /// Drives that are shown as the worst.
 const WORST: usize = 10;
@@ -36,6 +38,9 @@ pub struct Summary {
     pub judge: &'static str,
     /// Beyond it a drive is bad, if there is a limit.
     pub limit: Option<f64>,
+    /// How often intervals hold what they are of.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
     /// Drives beyond the limit, and those that diverged.
     pub beyond: Option<u64>,
     /// The field whose values are told apart, if the sweep compares.
@@ -108,7 +113,7 @@ pub(super) struct Summarised<'a> {
 }
 
 impl<'a> Summarised<'a> {
-    pub(super) fn new(sweep: &'a Sweep) -> Self {
+    pub(super) fn new(sweep: &'a Sweep, level: Confidence) -> Self {
         let metrics = sweep.metrics().len();
         let fields = sweep.sampled.len();
         let is_judge = |d: &&Definition| d.name == sweep.judge().name;
@@ -121,7 +126,7 @@ impl<'a> Summarised<'a> {
             left: BTreeMap::new(),
             beyond: 0,
             spreads: vec![Spread::default(); metrics],
-            effects: Effects::new(sweep, judge),
+            effects: Effects::new(sweep, judge, level),
             blocks: (sweep.design() == Design::Saltelli).then(|| Blocks::new(fields, metrics)),
             worst: Vec::new(),
         }
@@ -167,7 +172,7 @@ impl<'a> Summarised<'a> {
         };
         let place = self.worst.partition_point(behind);
         if place < WORST {
-            let values = point.values.iter().map(value::text).collect();
+            let values = point.values.iter().map(text).collect();
             let worst = Worst {
                 drive: point.drive,
                 seed: point.seed,
@@ -204,6 +209,7 @@ impl<'a> Summarised<'a> {
                 .collect(),
             judge: self.sweep.judge().name,
             limit: self.sweep.limit,
+            level: self.effects.confidence(),
             beyond: self.sweep.limit.map(|_| self.beyond),
             compare: self.sweep.compare.and_then(|axis| {
                 let axis = self.sweep.axes().nth(axis)?;

@@ -7,6 +7,8 @@ use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::simulate;
 
 use super::*;
+use crate::engine::{Watch, number, on_threads, text};
+use crate::statistics::Confidence;
 
 /// A straight and a curve, 18 s at 60 km/h: drives that take a millisecond.
 const ROAD: &str = "
@@ -32,6 +34,11 @@ fn refused(text: &str) -> String {
     sweep(text).unwrap_err()
 }
 
+fn driven(store: &Store, sweep: &Sweep, shard: Shard, threads: u32) {
+    let drive = || run_all(store, sweep, shard, &Watch::nobody());
+    on_threads(Some(threads), drive).unwrap().unwrap();
+}
+
 #[test]
 fn lists_and_ranges_meet_each_other_and_every_sample() {
     let sweep = with_road(
@@ -44,7 +51,7 @@ fn lists_and_ranges_meet_each_other_and_every_sample() {
         ["driver.t_n_s", "speed_m_per_s", "driver.k_hg"]
     );
     let points: Vec<DesignPoint> = (0..sweep.drives()).map(|drive| sweep.point(drive)).collect();
-    let of = |point: &DesignPoint| [0, 1].map(|i| value::text(&point.values[i]));
+    let of = |point: &DesignPoint| [0, 1].map(|i| text(&point.values[i]));
     let grid: BTreeSet<[String; 2]> = points.iter().map(of).collect();
     assert_eq!(grid.len(), 6);
     assert!(grid.contains(&["0.2".to_string(), "17".into()]), "{grid:?}");
@@ -78,7 +85,7 @@ fn a_row_is_the_drive_of_the_scenario_that_it_names() {
         "[scenario.failure]\nkind = \"torque\"\n[vary]\n\"driver.t_p_s\" = { uniform = [0.1, 0.5] }\n\"failure.time_s\" = { uniform = [6, 12] }\n",
     );
     let point = sweep.point(1);
-    let [t_p, time] = [0, 1].map(|i| value::number(&point.values[i]).unwrap());
+    let [t_p, time] = [0, 1].map(|i| number(&point.values[i]).unwrap());
     let course = "[course]\nname = \"one curve\"\nlane_width_m = 3.6\n[[course.segment]]\nlength_m = 100.0\ncurvature_start_per_m = 0.0\n\
                   curvature_end_per_m = 0.0\n[[course.segment]]\nlength_m = 200.0\ncurvature_start_per_m = 0.003\ncurvature_end_per_m = 0.003\n";
     let text = format!(
@@ -112,7 +119,7 @@ fn one_value_may_set_several_fields() {
         &format!("[vary]\ncurvature = {{ uniform = [0.001, 0.002], {fields} }}\n"),
     );
     let point = sweep.point(3);
-    let drawn = value::number(&point.values[0]).unwrap();
+    let drawn = number(&point.values[0]).unwrap();
     let scenario = sweep.scenario(&point).unwrap();
     let segments = scenario.course().segments();
     assert_eq!(
@@ -150,13 +157,11 @@ fn the_table_does_not_depend_on_threads_shards_and_restarts() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(&sweep, "test 1", folder.path()).unwrap();
         work(&store);
-        let summary = store.finish().unwrap();
+        let summary = store.finish(Confidence::USUAL).unwrap();
         let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap_or_default();
         (read("drives.csv"), read("drives.parquet"), summary)
     };
-    let drive = |store: &Store, shard: &str, threads| {
-        run_all(store, &sweep, shard.parse().unwrap(), Some(threads), |_| ()).unwrap()
-    };
+    let drive = |store: &Store, shard: &str, threads| driven(store, &sweep, shard.parse().unwrap(), threads);
     let whole = table(&|store| drive(store, "1/1", 1));
     assert_eq!(whole.0.iter().filter(|byte| **byte == b'\n').count(), 41);
     assert_eq!(whole, table(&|store| drive(store, "1/1", 3)));
@@ -200,7 +205,10 @@ fn a_directory_of_another_sweep_is_left_alone() {
         Err(StoreError::Another(_))
     ));
     let store = Store::open(&one, "test 1", folder.path()).unwrap();
-    assert!(matches!(store.finish(), Err(StoreError::Missing(1, 1))));
+    assert!(matches!(
+        store.finish(Confidence::USUAL),
+        Err(StoreError::Missing(1, 1))
+    ));
     assert!(matches!(store.put(0, b"bytes"), Err(StoreError::Corrupted(0))));
 }
 
@@ -215,8 +223,8 @@ fn an_early_stop_stops_where_the_mean_is_known() {
     let table = |threads| {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(&sweep, "test 1", folder.path()).unwrap();
-        run_all(&store, &sweep, Shard::WHOLE, Some(threads), |_| ()).unwrap();
-        let summary = store.finish().unwrap();
+        driven(&store, &sweep, Shard::WHOLE, threads);
+        let summary = store.finish(Confidence::USUAL).unwrap();
         (
             std::fs::read_to_string(folder.path().join("drives.csv")).unwrap(),
             summary,

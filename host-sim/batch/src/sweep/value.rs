@@ -117,24 +117,6 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), Stu
     Ok(())
 }
 
-/// The number in a value, if it is one.
-pub(crate) fn number(value: &Value) -> Option<f64> {
-    match value {
-        Value::Float(x) => Some(*x),
-        Value::Integer(x) => Some(*x as f64),
-        _ => None,
-    }
-}
-
-/// As a table's field shows it: a number that reads back to the same bits, a text without quotes.
-pub(crate) fn text(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.clone(),
-        Value::Float(x) => x.to_string(),
-        other => other.to_string(),
-    }
-}
-
 /// A field of a CSV table as a value of TOML: a whole number, a number, a truth value or a text.
 pub(super) fn from_csv(field: &str) -> Value {
     let field = field.trim();
@@ -180,6 +162,7 @@ pub(super) fn read_csv(name: &str, text: &str) -> Result<(Vec<String>, Vec<Vec<V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::number;
 
     fn at(distribution: &Distribution, u: f64) -> f64 {
         number(&distribution.at(u)[0]).unwrap()

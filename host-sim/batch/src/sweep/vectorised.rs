@@ -6,8 +6,8 @@ use haptic_sim::simulation::{Run, simulate};
 use haptic_vectorised::Options;
 
 use super::{Chunk, Driven, Sweep};
+use crate::engine::{Checked, Group};
 use crate::record::nominal_peak_m;
-use crate::vectorised::{Checked, Group};
 
 impl Sweep {
     /// Drives a chunk. What it gives follows from the sweep and the number alone.

@@ -15,8 +15,11 @@ const LAW_LAGS_S: [f64; 2] = [0.0, 30.0];
 
 /// The document of a study.
 pub fn report(results: &AdaptationResults) -> Report {
-    let maps = "Where K_hg settles at a fixed K_1, begun from a low and from a high K_hg, with 95 % intervals; where K_1 settles under each law \
-                at a K_hg that is held. The loop of both rests where the lines cross.";
+    let maps = format!(
+        "Where K_hg settles at a fixed K_1, begun from a low and from a high K_hg, with {} % intervals; where K_1 settles under each law \
+         at a K_hg that is held. The loop of both rests where the lines cross.",
+        results.level
+    );
     let over_time = "K_hg under each law; shaded: the torque is lost. The first seed.";
     let gains = "K_1 of the same drives.";
     let critical = format!(
@@ -56,10 +59,11 @@ fn summary(results: &AdaptationResults) -> String {
     let (road, kmh) = &results.place;
     format!(
         "{} laws behind the shipping ECU, {} drivers whose K_hg follows trust, {road} at {kmh} km/h, {} seeds. Maps: {settles_s} s to settle, \
-         {averages_s} s averaged. Loops: the torque is lost at {lost_at_s} s for {lost_for_s} s. Intervals are of 95 %, over the seeds.",
+         {averages_s} s averaged. Loops: the torque is lost at {lost_at_s} s for {lost_for_s} s. Intervals are of {level} %, over the seeds.",
         results.laws.len(),
         results.drivers.len(),
         results.seeds,
+        level = results.level,
     )
 }
 
@@ -142,7 +146,7 @@ fn maps_figure(results: &AdaptationResults) -> Figure {
         let map = &results.maps[number];
         let of_driver = |(end, label): (usize, &str)| {
             let found = || map.iter().filter_map(|point| Some((point.k_1, point.k_hg[end]?)));
-            let ends = found().map(|(_, value)| value.interval_95.unwrap_or([value.mean; 2]));
+            let ends = found().map(|(_, value)| value.interval.unwrap_or([value.mean; 2]));
             let points = found().map(|(k_1, value)| (k_1, value.mean)).collect();
             Series::with_mark(label, 6 * end, Mark::Whiskers(ends.collect()), points).joined()
         };

@@ -3,7 +3,8 @@
 use super::{listed, with_interval};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::compare::{Cell as Pair, CompareResults, LawResult, Mean, Metric, Ratio};
+use haptic_batch::compare::{Cell as Pair, CompareResults, LawResult, Metric, Ratio};
+use haptic_batch::{Confidence, Mean};
 
 /// Metrics of the terminal's matrices, and of the list of what a law makes worse.
 const FIRST: [&str; 4] = [
@@ -22,7 +23,11 @@ pub fn report(results: &CompareResults) -> Report {
         .filter(|(place, _)| has_values(results, *place));
     let blocks = matrices.flat_map(|(place, metric)| {
         let name = format!("matrix-{}", metric.name);
-        let figure = Block::figure(name, figure(results, place, metric), caption(metric));
+        let figure = Block::figure(
+            name,
+            figure(results, place, metric),
+            caption(metric, results.level),
+        );
         let table = Block::Table(matrix(results, place, metric));
         let is_first = FIRST.contains(&metric.name);
         [figure, if is_first { table } else { table.on_page() }]
@@ -48,11 +53,12 @@ fn summary(results: &CompareResults) -> String {
 
     format!(
         "{} laws behind the shipping ECU, {} drivers, {}, {} seeds each. In each drive {losses} instants of a sudden loss and {silences} of \
-         a silent lane. Intervals are of 95 %, over the seeds.",
+         a silent lane. Intervals are of {level} %, over the seeds.",
         results.laws.len(),
         results.drivers.len(),
         listed(&results.places),
-        results.seeds
+        results.seeds,
+        level = results.level,
     )
 }
 
@@ -143,10 +149,10 @@ fn rounded(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').into()
 }
 
-fn caption(metric: &Metric) -> String {
+fn caption(metric: &Metric, level: Confidence) -> String {
     let better = if metric.more_is_better { "More" } else { "Less" };
     format!(
-        "{} ({}) by law, a panel for each driver, with 95 % intervals. {better} is better.",
+        "{} ({}) by law, a panel for each driver, with {level} % intervals. {better} is better.",
         metric.label, metric.unit
     )
 }
@@ -173,7 +179,7 @@ fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
         let cells = results.cells.iter().filter(|pair| pair.driver == number);
         let found = cells.filter_map(|pair| Some((super::place(pair.law), pair.values[place]?)));
         let (points, ends) = found
-            .map(|(x, value)| ((x, value.mean), value.interval_95.unwrap_or([value.mean; 2])))
+            .map(|(x, value)| ((x, value.mean), value.interval.unwrap_or([value.mean; 2])))
             .unzip();
         let series = Series::with_mark("", 0, Mark::Whiskers(ends), points);
         Panel::new(name, Axis::new(metric.label, metric.unit), [series])
@@ -193,7 +199,7 @@ fn clear(results: &CompareResults) -> impl Iterator<Item = (&Pair, &Metric, Mean
         let metrics = metrics.filter(|(metric, _)| FIRST.contains(&metric.name));
         metrics.filter_map(move |(metric, difference)| {
             let difference = (*difference)?;
-            let [low, high] = difference.interval_95?;
+            let [low, high] = difference.interval?;
             let is_less = high < 0.0;
             (is_less || low > 0.0).then_some((pair, metric, difference, is_less != metric.more_is_better))
         })

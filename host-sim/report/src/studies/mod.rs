@@ -27,7 +27,7 @@ pub mod validation;
 
 use crate::document::WriteError;
 use crate::plot::{Mark, Marker, PlotError, Series};
-use haptic_batch::compare::Mean;
+use haptic_batch::Mean;
 use haptic_log::trace::Sample;
 use haptic_sim::scenario::Scenario;
 
@@ -60,10 +60,7 @@ fn failure_marker(scenario: &Scenario, samples: &[Sample]) -> Option<Marker> {
 
 /// A mean with half its interval; a dash if there is none.
 fn with_interval(value: Option<&Mean>) -> String {
-    value.map_or("\u{2013}".into(), |value| match value.interval_95 {
-        Some([low, high]) => format!("{:.3} \u{b1} {:.3}", value.mean, 0.5 * (high - low)),
-        None => format!("{:.3}", value.mean),
-    })
+    value.map_or("\u{2013}".into(), Mean::to_string)
 }
 
 /// Roads with their speeds, as a sentence lists them.

@@ -52,12 +52,15 @@ pub fn write_tables(results: &StudyResults, directory: &Path) -> Result<(), Writ
         table.finish()
     })?;
     write_file(&directory.join("differences.csv"), |file| {
-        let names = "from,to,metric,unit,participants,mean,from_95,to_95,effect_size_dz";
+        let names = format!(
+            "from,to,metric,unit,participants,mean,from_{0},to_{0},effect_size_dz",
+            results.level
+        );
         let mut table = TableWriter::new(file, names.split(','))?;
         for d in &results.differences {
             let words = [&d.from, &d.to, d.metric, d.unit].map(String::from);
-            let [low, high] = d.interval_95.map_or([None; 2], |ends| ends.map(Some));
-            let numbers = [Some(d.mean), low, high, d.effect_size];
+            let [low, high] = d.mean.interval.map_or([None; 2], |ends| ends.map(Some));
+            let numbers = [Some(d.mean.mean), low, high, d.effect_size];
             let numbers = numbers.map(|x| x.map_or(String::new(), |x| x.to_string()));
             table.row(
                 words
@@ -155,15 +158,16 @@ const SHOWN: [&str; 4] = [
 
 /// How much the conditions differ in some metrics, participant by participant.
 fn differences(results: &StudyResults) -> Table {
+    let from = format!("{} % from", results.level);
     let row = |d: &Difference| {
         let label = DEFINITIONS.iter().find(|own| own.name == d.metric);
-        let [low, high] = Cell::ends(d.interval_95, 4);
+        let [low, high] = Cell::ends(d.mean.interval, 4);
         [
             ("Conditions", Cell::text(format!("{} - {}", d.to, d.from))),
             ("Metric", Cell::text(label.map_or(d.metric, |own| own.label))),
             ("Unit", Cell::text(d.unit)),
-            ("Difference", Cell::number(d.mean, 4)),
-            ("95 % from", low),
+            ("Difference", Cell::number(d.mean.mean, 4)),
+            (from.as_str(), low),
             ("to", high),
             ("d_z", Cell::number(d.effect_size, 2)),
             ("n", Cell::count(d.participants)),
@@ -171,8 +175,11 @@ fn differences(results: &StudyResults) -> Table {
     };
     let shown = results.differences.iter().filter(|d| SHOWN.contains(&d.metric));
     Table::of_rows(
-        "Differences within participants, each with its own 95 % interval (not corrected for their number); d_z is the \
-                  mean over the standard deviation of the differences. differences.csv has every metric.",
+        format!(
+            "Differences within participants, each with its own {} % interval (not corrected for their number); d_z is the \
+             mean over the standard deviation of the differences. differences.csv has every metric.",
+            results.level
+        ),
         shown.map(row),
     )
 }

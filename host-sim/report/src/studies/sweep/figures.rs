@@ -144,7 +144,7 @@ fn series(summary: &Summary, effect: &Effect, places: &[f64], joined: bool, know
     let best = levels().filter(|(_, level)| effect.best.contains(&level.label));
     let best = best.filter_map(|(x, level)| Some((x, known(&level.drives).0?)));
     vec![
-        line("mean, with its 95 % interval", 1, all),
+        line(&format!("mean, with its {} % interval", summary.level), 1, all),
         Series::dots("best, with what is not told apart from it", 3, best.collect()),
     ]
 }

@@ -98,6 +98,7 @@ fn indices(summary: &Summary) -> Table {
 fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
     let (name, unit) = metric(summary.judge);
     let mean = format!("Mean {} ({unit})", lower(&name));
+    let from = format!("{} % from", summary.level);
     let digits = decimals(summary.judge);
     let row = |effect: &Effect, level: &Level| {
         let drives = &level.drives;
@@ -119,7 +120,7 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
             let [low, high] = Cell::ends(interval, decimals);
             cells.extend([
                 (name, Cell::number(value, decimals)),
-                ("95 % from", low),
+                (from.as_str(), low),
                 ("to", high),
             ]);
         };

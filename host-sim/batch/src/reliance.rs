@@ -12,13 +12,11 @@
 //!
 //! Not here: the estimator (`haptic_core::estimator`), options and tables (the command line).
 
-mod readings;
-
-use rayon::prelude::*;
 use serde::Serialize;
 
-pub use readings::{Reading, Readings};
+pub use crate::readings::{Reading, Readings};
 
+use crate::engine::{Watch, each};
 use crate::error::{StudyError, refuse};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::STEP_S;
@@ -155,12 +153,11 @@ struct Drive {
     example: Option<Example>,
 }
 
-/// Drives and evaluates; `progress` is called after each pair of drives, of which there are as many as
-/// participants times seeds.
+/// Drives and evaluates: a pair of drives for each participant and seed.
 ///
 /// # Errors
 /// A participant or a parameter of the probe that is out of range.
-pub fn study(plan: &ReliancePlan, progress: impl Fn() + Sync) -> Result<RelianceResults, StudyError> {
+pub fn study(plan: &ReliancePlan, watch: &Watch<'_>) -> Result<RelianceResults, StudyError> {
     let all = participants();
     let chosen: Vec<usize> = plan
         .participants
@@ -175,15 +172,9 @@ pub fn study(plan: &ReliancePlan, progress: impl Fn() + Sync) -> Result<Reliance
         .iter()
         .flat_map(|&place| (0..plan.seeds).map(move |seed| (place, seed)))
         .collect();
-    let drives: Vec<Drive> = jobs
-        .par_iter()
-        .map(|&(place, seed)| {
-            let drive = both_drives(plan, &all, place, seed);
-            progress();
-            drive
-        })
-        .collect::<Result<_, _>>()?;
-
+    let drives = each(&jobs, watch, |&(place, seed)| {
+        both_drives(plan, &all, place, seed)
+    })?;
     let accuracy = |drives: &[Drive]| -> Vec<Accuracy> {
         let at = |(i, &after_s): (usize, &f64)| {
             let points: Vec<EstimateAndTruth> =

@@ -2,11 +2,8 @@
 
 use serde::Serialize;
 
-use super::RunRecord;
+use crate::RunRecord;
 use haptic_sim::scenario::{Condition, FailureKind, Sensors};
-
-/// Processing delays of the three drivers, s (table 7).
-pub const DRIVERS_T_P: [f64; 3] = [0.1, 0.3, 0.5];
 
 /// Something that the evaluation must show, and whether it did.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -1,28 +1,22 @@
 //! Many runs: side by side first ([`haptic_vectorised`]), and with the shipping ECU where that is not enough.
 //!
 //! What cannot be vectorised, and every run in which something could have ended guidance, is rejected, to be driven alone with
-//! the shipping ECU. [`crate::shares()`] says how many were, and why. So that no result depends on who drove, one run in a hundred, and one of each
+//! the shipping ECU. [`super::shares()`] says how many were, and why. So that no result depends on who drove, one run in a hundred, and one of each
 //! study at least, is driven by both: a bit that differs, in any field of any sample, is an error.
-//!
-//! - `run_all`: the runs of a study, on all cores.
-//! - `Group`: some of them, in one thread.
 
 use haptic_log::trace::CHANNELS;
 use haptic_sim::scenario::Scenario;
 use haptic_sim::seeds::{self, Stream};
-use haptic_sim::simulation::{Run, simulate};
+use haptic_sim::simulation::Run;
 use haptic_vectorised::{BATCH, Event, Options, Reason, run_batch};
-use rayon::prelude::*;
 
+use super::shares::count;
 use crate::error::{StudyError, refuse};
-use crate::shares::count;
 
 /// One in so many runs of a batch is driven by the shipping ECU too.
 const CHECKED_OF: u64 = 100;
 /// Fewer runs than this are as soon done one by one: a block of steps takes its time however few are under way.
 const FEWEST: usize = BATCH / 4;
-/// Most runs of a group: the more, the less often a batch waits for its last run, and the fewer threads share the work.
-const MOST_OF_A_GROUP: usize = 4 * BATCH;
 
 /// Which runs are driven twice.
 #[derive(Debug, Clone, Copy)]
@@ -164,72 +158,15 @@ fn agree(number: u64, batched: &Run, alone: &Run) -> Result<(), StudyError> {
     }
 }
 
-/// Drives the runs of a study on all cores, and gives what `measure` makes of each, in their order. The runs that are driven
-/// twice are drawn by the seed.
-///
-/// # Errors
-/// As [`Group::run_batch`]; what `measure` says.
-pub(crate) fn run_all<T: Send>(
-    scenarios: &[Scenario],
-    seed: u64,
-    measure: impl Fn(usize, &Run) -> Result<T, StudyError> + Sync,
-) -> Result<Vec<T>, StudyError> {
-    let checked = Checked::new(seed, scenarios.len() as u64);
-    let found = in_groups(scenarios, |first, scenarios| {
-        let group = Group {
-            scenarios,
-            first: first as u64,
-            checked,
-        };
-        let alone = |place: usize| simulate(&scenarios[place]);
-        group.measured(Options::default(), alone, |place, run| {
-            measure(first + place, run)
-        })
-    })?;
-    let found = found.into_par_iter().zip(scenarios).enumerate();
-    found
-        .map(|(number, (found, scenario))| found.map_or_else(|| measure(number, &simulate(scenario)), Ok))
-        .collect()
-}
-
-/// What `of_group` makes of the parts of a list, on all cores, in the list's order; it gets the place of the part's first.
-///
-/// # Errors
-/// What `of_group` says.
-pub(crate) fn in_groups<J: Sync, T: Send>(
-    jobs: &[J],
-    of_group: impl Fn(usize, &[J]) -> Result<Vec<T>, StudyError> + Sync,
-) -> Result<Vec<T>, StudyError> {
-    let share = jobs.len().div_ceil(rayon::current_num_threads()).max(1);
-    let size = if share < 2 * BATCH {
-        share
-    } else {
-        // Several groups for each thread, so that none waits long for the last.
-        (share / 2).next_multiple_of(BATCH).min(MOST_OF_A_GROUP)
-    };
-    let one = |(number, group): (usize, &[J])| {
-        let found = of_group(number * size, group)?;
-        // One less would give every later job another's result.
-        if found.len() == group.len() {
-            Ok(found)
-        } else {
-            refuse(format!("{} of {} runs came back", found.len(), group.len()))
-        }
-    };
-    let groups = jobs.par_chunks(size).enumerate().map(one);
-    let groups: Vec<Vec<T>> = groups.collect::<Result<_, StudyError>>()?;
-    Ok(groups.into_iter().flatten().collect())
-}
-
 #[cfg(test)]
 mod tests {
-    use haptic_sim::scenario::{Condition, Sensors};
-    use haptic_sim::simulation::Ending;
+    use haptic_sim::scenario::Condition;
+    use haptic_sim::simulation::{Ending, simulate};
 
     use super::*;
 
     fn scenario(condition: Condition) -> Scenario {
-        let course = crate::handover::stretched_curve(0.5).unwrap();
+        let course = crate::paper::stretched_curve(0.5).unwrap();
         let scenario = Scenario::builder().course(course).condition(condition);
         scenario.build().unwrap()
     }
@@ -292,29 +229,5 @@ mod tests {
         }
         // Binomial: 1000 and four standard deviations of 31.
         assert!((875..1126).contains(&count(100_000)), "{}", count(100_000));
-    }
-
-    /// Runs that are rejected (exact sensors) and runs that are not: each once, in its place.
-    #[test]
-    fn every_run_is_driven_once_whoever_drives_it() {
-        let scenarios: Vec<Scenario> = (0..21)
-            .map(|i| {
-                let builder = scenario(Condition::ALL[i % 4]).to_builder().seed(i as u64);
-                let exact = i % 3 == 0;
-                let sensors = if exact { Sensors::Exact } else { Sensors::Paper };
-                builder.sensors(sensors).build().unwrap()
-            })
-            .collect();
-        let runs = run_all(&scenarios, 1, |number, run| Ok((number, run.clone()))).unwrap();
-        assert_eq!(runs.len(), 21);
-        for (place, (number, run)) in runs.iter().enumerate() {
-            assert_eq!((place, run), (*number, &simulate(&scenarios[place])));
-        }
-        let refused = run_all(
-            &scenarios,
-            1,
-            |number, _| if number == 5 { refuse("5") } else { Ok(()) },
-        );
-        assert_eq!(refused, refuse("5"));
     }
 }

@@ -12,8 +12,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
-use crate::entries::{Entry, EntryKind};
-use crate::sweep::value;
+use super::{Entry, EntryKind, number, text};
 
 /// Rows in memory at once.
 const ROWS_OF_A_GROUP: usize = 65_536;
@@ -27,7 +26,7 @@ enum ParquetColumn {
 }
 
 /// A table on its way.
-pub(crate) struct Table {
+pub(super) struct Table {
     writer: SerializedFileWriter<BufWriter<File>>,
     columns: Vec<ParquetColumn>,
     rows: usize,
@@ -35,7 +34,7 @@ pub(crate) struct Table {
 
 impl Table {
     /// A table with its columns, empty, and with what the file's metadata say.
-    pub(crate) fn create(
+    pub(super) fn create(
         columns: impl IntoIterator<Item = (String, EntryKind)>,
         metadata: &[(&str, &str)],
         file: File,
@@ -69,7 +68,7 @@ impl Table {
     }
 
     /// A row, with an entry of its kind for each column.
-    pub(crate) fn row<'a>(&mut self, entries: impl IntoIterator<Item = Entry<'a>>) -> io::Result<()> {
+    pub(super) fn row<'a>(&mut self, entries: impl IntoIterator<Item = Entry<'a>>) -> io::Result<()> {
         for (column, entry) in self.columns.iter_mut().zip(entries) {
             column.push(entry);
         }
@@ -90,7 +89,7 @@ impl Table {
         Ok(())
     }
 
-    pub(crate) fn finish(mut self) -> io::Result<()> {
+    pub(super) fn finish(mut self) -> io::Result<()> {
         if self.rows > 0 {
             self.write_group()?;
         }
@@ -132,8 +131,8 @@ impl ParquetColumn {
             (Self::Number(values), Entry::Number(value)) => values.push(value),
             (Self::Text(values), Entry::Text(value)) => values.push(value),
             (Self::Flag(values), Entry::Flag(value)) => values.push(value),
-            (Self::Number(values), Entry::Value(value)) => values.push(value::number(value)),
-            (Self::Text(values), Entry::Value(value)) => values.push(value::text(value)),
+            (Self::Number(values), Entry::Value(value)) => values.push(number(value)),
+            (Self::Text(values), Entry::Value(value)) => values.push(text(value)),
             // The group would not close: its columns differ in length.
             _ => {}
         }

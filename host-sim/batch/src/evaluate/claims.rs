@@ -7,9 +7,10 @@
 //! in numbers is this project's reading, stated in each claim. A claim that rests on a run in which the ECU ended guidance
 //! by itself is not held, whatever its numbers are.
 
-pub use super::evaluation_results::Claim;
-use super::evaluation_results::{DRIVERS_T_P, EvaluationResults};
-use super::{Away, RunRecord, left_by_themselves};
+use super::EvaluationResults;
+pub use super::results::Claim;
+use crate::paper::DRIVERS_T_P;
+use crate::{Away, RunRecord, left_by_themselves};
 use haptic_analysis::metrics::{Metrics, Window};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
@@ -91,7 +92,7 @@ pub(super) fn apply_to(base: &Scenario, window: Window) -> bool {
         })
         .build();
     let comparable = comparable.is_ok_and(|comparable| comparable == *base);
-    comparable && window == super::record::default_window(base.course())
+    comparable && window == crate::record::default_window(base.course())
 }
 
 pub(super) fn check(results: &EvaluationResults, runs: &[(Scenario, Run)]) -> Vec<Claim> {
@@ -332,13 +333,15 @@ impl Claims<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::Watch;
     use crate::evaluate::{Evaluation, evaluate};
     use haptic_sim::unguided::Cause;
 
     /// Driver 1 with high reliance and no failure: of all claims but the one of driver 3 alone this run is a part.
     #[test]
     fn a_claim_is_not_held_where_it_rests_on_a_run_that_was_not_guided_throughout() {
-        let Evaluation { runs, mut results } = evaluate(&Scenario::default(), None, || ()).unwrap();
+        let Evaluation { runs, mut results } =
+            evaluate(&Scenario::default(), None, &Watch::nobody()).unwrap();
         assert!(results.claims.len() == 7 && results.all_claims_hold());
         let held = check(&results, &runs);
         let mut left = |why| {

@@ -7,7 +7,16 @@
 use haptic_analysis::identify::DriveLog;
 use haptic_sim::Outcome;
 use haptic_sim::models::{STEPS_PER_SECOND, sensors};
+use haptic_sim::scenario::Scenario;
+use haptic_sim::simulation::{Run, observe};
 use haptic_vectorised::Step;
+
+/// The run of a scenario with the shipping ECU, and its log with the resolution of the sensors.
+pub(crate) fn recorded(scenario: &Scenario) -> (Run, DriveLog) {
+    let mut recorder = Recorder::new(true);
+    let run = observe(scenario, |outcome| recorder.observe(outcome));
+    (run, recorder.into_log())
+}
 
 /// Rows a second.
 const RATE_HZ: u32 = 120;
@@ -40,7 +49,7 @@ impl Recorder {
     }
 
     /// Takes in one step of a vectorised run: without errors of sensors, what is true is what is observed.
-    pub(super) fn take(&mut self, now: Step) {
+    pub(crate) fn take(&mut self, now: Step) {
         let Some(last) = self.last.replace(now) else {
             return;
         };

@@ -7,7 +7,7 @@ use haptic_vectorised::Reason;
 /// Runs since the program began that were driven side by side, and behind them those that were rejected, by reason.
 static COUNTS: [AtomicU64; 1 + Reason::ALL.len()] = [const { AtomicU64::new(0) }; 1 + Reason::ALL.len()];
 
-pub(crate) fn count(rejected: Option<Reason>) {
+pub(super) fn count(rejected: Option<Reason>) {
     let place = rejected.map_or(0, |reason| 1 + reason as usize);
     COUNTS[place].fetch_add(1, Ordering::Relaxed);
 }
