@@ -34,9 +34,9 @@ pub struct ChangesLine {
     pub seen: usize,
     /// Drives that were refuted for something else.
     pub refuted_otherwise: usize,
-    /// Of those seen, whose only change was a step of K_hg.
+    /// Drives that were seen to change, and whose only change was a step of K_hg.
     pub steps_seen: usize,
-    /// Those of them whose instant is within 5 s of the truth.
+    /// Steps that were seen, with their instant within 5 s of the truth.
     pub within_5_s: usize,
     /// Instants of those seen, of which there was one change: begin and end, and whether their 95 % intervals hold the truth.
     pub instants: Held,

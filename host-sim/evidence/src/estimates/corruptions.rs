@@ -26,7 +26,7 @@ use haptic_sim::participants::PublishedDriver;
 pub struct Held {
     /// Identified values.
     pub identified: usize,
-    /// Those whose interval holds the truth.
+    /// Values whose interval holds the truth.
     pub held: usize,
 }
 
@@ -77,7 +77,7 @@ pub struct CorruptionLine {
     pub false_identifications: usize,
     /// Share of the 95 % intervals, of those that were identified, that hold the truth.
     pub coverage: Option<f64>,
-    /// The same of gain_1, gain_2, gain_3, t_p and K_hg, counted.
+    /// Intervals of gain_1, gain_2, gain_3, t_p and K_hg that hold the truth, counted.
     pub intervals: [Held; COMPARED],
     /// Root mean square error of gain_1, gain_2, gain_3, t_p and K_hg, refuted or not.
     pub rms: [f64; COMPARED],
@@ -101,8 +101,8 @@ pub struct Corruptions {
     pub false_identifications: usize,
     /// 95 % intervals in all, by parameter as in the lines, but of drivers who change: these have no one truth.
     pub intervals: [Held; COMPARED],
-    /// The same of the drivers whose t_nms is what is assumed. Intervals hold arms of all kinds 95 times in 100, those at
-    /// the edge of the range of arms less often.
+    /// Intervals of the drivers whose t_nms is what is assumed. Intervals hold arms of all kinds 95 times in 100, those
+    /// at the edge of the range of arms less often.
     pub intervals_at_t_nms: [Held; COMPARED],
     /// Least RMS errors of an unbiased estimator from the clean logs, in the order of the lines' own.
     pub bound: [f64; COMPARED],

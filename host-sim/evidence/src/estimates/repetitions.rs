@@ -133,7 +133,7 @@ pub(super) fn bound_of(log: &DriveLog, truth: &PublishedDriver) -> [f64; COMPARE
 }
 
 impl Repeated {
-    /// Of at least one drive.
+    /// What at least one drive shows.
     fn new(participant: Option<u32>, i: usize, judged: &[DriveResult]) -> Self {
         let drives: Vec<Compared> = judged.iter().map(|j| j.values[i]).collect();
         let at_t_nms = judged.iter().filter(|j| j.held_at_t_nms[i]).count();

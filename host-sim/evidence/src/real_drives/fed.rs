@@ -52,7 +52,7 @@ pub struct Fed {
     pub overridden_h: f64,
     /// What ended guidance, each by itself.
     pub ends: Vec<End>,
-    /// The same in all recordings: all, then by cause, the most frequent first.
+    /// What ended guidance in all recordings: all, then by cause, the most frequent first.
     pub endings: Vec<Ending>,
 }
 
