@@ -264,6 +264,106 @@ async function drive() {
   live.end();
 }
 
+// A wheel that nobody built: inertia, friction of both kinds, a motor that answers late, and reports of seven bytes.
+class FakeWheel {
+  productName = "Fake wheel"; vendorId = 0x046d; opened = false; collections = [{ outputReports: [{ reportId: 0, items: [{ reportSize: 8, reportCount: 7 }] }] }];
+  reports = []; time_ms = 0; angle = 0; rate = 0; #under_way = []; #level = 0;
+  constructor({ inertia = 0.03, viscous = 0.1, coulomb = 0.05, motor_nm = 2.5, late_ms = 8, way = 1 } = {}) { Object.assign(this, { inertia, viscous, coulomb, motor_nm, late_ms, way }); }
+  async open() { this.opened = true; }
+  async close() { this.opened = false; }
+  async sendReport(id, bytes) {
+    this.reports.push({ id, bytes: [...bytes], time_ms: this.time_ms });
+    this.#under_way.push([this.time_ms + this.late_ms, bytes[0] === 0x11 && bytes[1] === 0x08 ? (bytes[2] - 0x80) / 127 : 0]);
+  }
+  step() {
+    this.time_ms++;
+    while (this.#under_way.length && this.#under_way[0][0] <= this.time_ms) this.#level = this.#under_way.shift()[1];
+    const turned = this.rate + 1e-3 / this.inertia * (this.way * this.motor_nm * this.#level - this.viscous * this.rate), rubbed = 1e-3 * this.coulomb / this.inertia;
+    this.rate = Math.sign(turned) * Math.max(0, Math.abs(turned) - rubbed);
+    this.angle += 1e-3 * this.rate;
+  }
+}
+const levels = fake => fake.reports.filter(({ bytes }) => bytes[0] === 0x11).map(({ bytes }) => bytes[2] - 0x80);
+// So many seconds of 60 pictures, nobody's hands on the wheel; the levels of each picture.
+async function felt_drive(fake, seconds, hold = true) {
+  const given = [];
+  Object.defineProperty(navigator, "hid", { configurable: true, value: { requestDevice: async () => [fake], addEventListener: (_, heard) => { fake.unplug = () => heard({ device: fake }); } } });
+  Object.defineProperty(navigator, "getGamepads", { configurable: true, value: () => [{ connected: true, id: "Fake racing wheel", axes: [-fake.angle / HAND.wheel_rad] }] });
+  await felt.connect();
+  page.startLive();
+  for (let k = 0; k < 60 * seconds && page.live.going; k++) {
+    if (k === 1 && hold) document.body.dispatchEvent(new KeyboardEvent("keydown", { key: " ", bubbles: true }));
+    while (fake.time_ms < k * 1000 / 60) fake.step();
+    liveFrame(k * 1000 / 60);
+    given.push(felt.level);
+    for (let n = 0; n < 8; n++) await null;
+  }
+  return given;
+}
+async function feltWheel() {
+  page.go("drive");
+  page.say({ course: "bends", guided: "on", speed: 60 });
+  await pause(200);
+  for (const way of [1, -1]) {
+    const fake = new FakeWheel({ way });
+    await felt_drive(fake, 12);
+    const all = levels(fake), apart = Math.abs(fake.angle - page.live.now().wheel_angle_rad), steps = all.slice(1).map((level, i) => Math.abs(level - all[i]));
+    check(`a wheel whose motor turns it ${way > 0 ? "left" : "right"}`, fake.reports[0].bytes[0] === 0xf5 && Math.max(...all.map(Math.abs)) <= 51 && Math.max(...all.map(Math.abs)) > 5 && Math.max(...steps) <= 6 && apart < 0.2
+      && Math.abs(page.live.now().wheel_angle_rad) > 0.05, `${all.length} reports, largest level ${Math.max(...all.map(Math.abs))} of 127, largest step ${Math.max(...steps)}, ${apart.toFixed(3)} rad from the wheel of the model at ${page.live.now().wheel_angle_rad.toFixed(3)} rad`);
+    document.body.dispatchEvent(new KeyboardEvent("keyup", { key: " ", bubbles: true }));
+    for (let n = 0; n < 20; n++) await null;
+    check("let go", fake.reports.at(-1).bytes[0] === 0x13, fake.reports.at(-1).bytes.join(" "));
+    const count = fake.reports.length;
+    fake.unplug();
+    felt.hold(true);
+    felt.frame(1e6, 1, 0);
+    check("unplugged", fake.reports.length === count && !felt.isThere, $("feltsaid").textContent);
+    felt.hold(false);
+    page.live.end();
+  }
+  const untouched = new FakeWheel();
+  await felt_drive(untouched, 3, false);
+  check("no force without the key", levels(untouched).length === 0, `${untouched.reports.length} reports`);
+  page.live.end();
+  const stuck = new FakeWheel({ coulomb: 5 });
+  await felt_drive(stuck, 4);
+  check("a wheel that does not turn", stuck.reports.at(-1).bytes[0] === 0x13 && $("feltsaid").textContent.includes("no force"), $("feltsaid").textContent);
+  page.live.end();
+  // A page that hangs: no picture for longer than the watch allows.
+  const hung = new FakeWheel(), alone = new FeltWheel(() => {});
+  Object.defineProperty(navigator, "hid", { configurable: true, value: { requestDevice: async () => [hung], addEventListener: () => {} } });
+  await alone.connect();
+  alone.hold(true);
+  for (let k = 0; k < 3; k++) { alone.frame(performance.now(), 1, 0); await pause(16); }
+  await pause(600);
+  check("a page that hangs", levels(hung).length > 0 && hung.reports.at(-1).bytes[0] === 0x13, hung.reports.at(-1).bytes.join(" "));
+  await feltMap();
+}
+
+// Which part of the torque stays calm on which wheel, nobody's hands on it: the turns a second of a level of more than 0.05, in the last four
+// of nine seconds, which are in a bend.
+async function feltMap() {
+  const rows = [];
+  for (const inertia of [0.02, 0.06]) {
+    for (const viscous of [0.03, 0.1, 0.3]) {
+      const cells = [];
+      for (const part of [0.2, 0.5, 1]) {
+        felt.part = part;
+        const given = (await felt_drive(new FakeWheel({ inertia, viscous }), 9)).slice(-240);
+        page.live.end();
+        felt.hold(false);
+        const calm = given.length === 240 && !page.live.now().diverged;
+        let turns = 0, side = 0;
+        for (const level of given) if (Math.abs(level) > 0.05 && Math.sign(level) !== side) { turns += side !== 0; side = Math.sign(level); }
+        cells.push(calm ? (turns / 4).toFixed(1) : "off");
+      }
+      rows.push(`${inertia} kg.m2 ${viscous} N.m.s: ${cells.join(" ")}`);
+    }
+  }
+  felt.part = 0.5;
+  check("calm wheels (turns a second at 20, 50 and 100 %)", rows.filter(row => row.includes("0.3 N.m.s: 0.0 0.0")).length === 2, rows.join("; "));
+}
+
 async function law() {
   const write = async text => { const area = $("lawtext"); area.value = text; area.dispatchEvent(new Event("input")); await pause(600); await settled("law"); return $("lawsaid").textContent; };
   await visit("law");
@@ -359,7 +459,7 @@ async function addresses() {
 }
 
 return (async () => {
-  for (const part of [story, handovers, probe, compare, drive, law, files, addresses]) {
+  for (const part of [story, handovers, probe, compare, drive, feltWheel, law, files, addresses]) {
     try { await part(); } catch (error) { check(part.name, false, `${error} ${error.stack}`); }
   }
   page.go("failure");

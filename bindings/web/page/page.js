@@ -13,7 +13,7 @@ function el(name, attributes = {}, ...children) {
 const ORDER = ["loop", "guidance", "reliance", "failure", "handover", "probe", "compare", "drive", "law"];
 const START = { a: { ...PLAIN, t_p: 0.5, ...onLine(0), course: "bends" }, b: { ...PLAIN, t_p: 0.5, ...onLine(0), course: "bends", fail: "torque", at: 30 } };
 
-let S, lab, drives, live, scene, needle, view, results = {}, last = {}, charts = [], loopPicture = null;
+let S, lab, drives, live, felt, scene, needle, view, results = {}, last = {}, charts = [], loopPicture = null;
 // Where the paper's first bend begins to turn the car, s.
 const BEFORE_S = 67;
 const clock = { at: 0, from: 0, to: 1, playing: true, before: null, key: "" };
@@ -222,7 +222,7 @@ function render() {
   drawGuess(S, view);
   needle.show(view.needle !== undefined && !isAsked(S));
   $("editor").hidden = !view.editor;
-  $("live").hidden = $("found").hidden = !isLive;
+  $("live").hidden = $("found").hidden = $("felt").hidden = !isLive;
   $("player").hidden = isLive;
   $("play").disabled = $("time").disabled = isAsked(S);
   if (view.editor) drawLaw(found[0]);

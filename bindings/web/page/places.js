@@ -62,7 +62,8 @@ function liveFrame(time) {
   now.alarm = now.warning && live.settings.guided ? t("alarm") : "";
   now.note = !live.settings.guided ? t("alone") : now.time_s >= live.failed_s ? t("failed") : "";
   scene.paint(now, live.road);
-  if (!live.going) return;
+  if (!live.going) { felt.stop(); return; }
+  felt.frame(time, -now.driver_torque_nm, live.target_rad);
   $("told").textContent = `${now.time_s.toFixed(0)} s. ${live.told}`;
   if (time - drawn > 500) {
     drawn = time;
@@ -92,6 +93,20 @@ function drawLaw(result) {
   $("lawsaid").className = fault || odd ? "bad" : "";
   const numbers = $("lawlines");
   numbers.replaceChildren(...Array.from({ length: lines }, (_, i) => el("span", { class: i + 1 === line ? "wrong" : "" }, `${i + 1}\n`)));
+}
+
+function listenFelt() {
+  const hold = $("felthold"), part = $("feltpart"), show = () => { felt.part = Number(part.value); $("feltis").textContent = `${(100 * felt.part).toFixed(0)} %`; };
+  felt = new FeltWheel(text => { $("feltsaid").textContent = text; hold.disabled = !felt.isThere; });
+  live.isFelt = () => felt.isThere;
+  show();
+  part.addEventListener("input", show);
+  $("feltconnect").addEventListener("click", () => felt.connect());
+  const isKey = event => event.key === " " && live.going && felt.isThere && !event.target.matches?.("input, select, textarea, summary, button:not(#felthold)");
+  hold.addEventListener("pointerdown", event => { hold.setPointerCapture(event.pointerId); felt.hold(true); });
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) hold.addEventListener(name, () => felt.hold(false));
+  addEventListener("keydown", event => { if (isKey(event)) { event.preventDefault(); felt.hold(true); } });
+  addEventListener("keyup", event => { if (event.key === " ") felt.hold(false); });
 }
 
 async function share(kind) {
@@ -148,6 +163,7 @@ function listen() {
   addEventListener("hashchange", () => arrive());
   addEventListener("resize", soon);
   listenLaw();
+  listenFelt();
 }
 function arrive() {
   const { state, odd } = fromAddress(location.hash);
