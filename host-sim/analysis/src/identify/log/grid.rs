@@ -6,7 +6,7 @@
 
 use haptic_log::recording::Lines;
 
-use super::super::signals::SWITCH_RATE_NM_S;
+use super::super::switches::SWITCH_RATE_NM_S;
 use super::{GUIDANCE_COLUMN, LogError, SHORTEST_S, refuse, too_short};
 
 /// Share of a sample period by which a time stamp may miss the even grid: rounding to a millisecond makes it 6 %

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::delays::Delays;
+use super::delays::{Delays, Line};
 use super::sums::Rows;
 use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, Problem, T_NMS, T_P};
 use crate::identify::search::{Quadratic, covariance, step};
@@ -49,7 +49,7 @@ impl Problem<'_> {
         delays.extend((-4..=4).map(|i| (p[T_P] + 0.5 * f64::from(i) * error).clamp(0.0, LONGEST_DELAY_S)));
         delays.sort_by(f64::total_cmp);
         delays.dedup();
-        let along = Delays::new(self, p).at(&delays);
+        let along = Delays::new(self, p, Line::Size).at(&delays);
         delays
             .into_iter()
             .zip(along)
