@@ -240,6 +240,13 @@ impl Problem<'_> {
                 None => format!("K_nms is {} N.m/rad", p[K_NMS]),
             });
         }
+        if let Some(a) = about(OWN_OFFSET) {
+            let sd = a.sd;
+            out.push(format!(
+                "the driver's line is the target line, give or take {sd} m on a straight road and {sd} m in a bend of 300 m at 60 km/h: \
+                 the errors hold that"
+            ));
+        }
         if let Some(a) = about(H_LATE) {
             let ms = 1e3 * a.sd;
             out.push(format!(
@@ -416,6 +423,13 @@ fn power_of(found: &Identification) -> Vec<String> {
         }
         Some(_) => None,
     };
+    if found.balance.as_ref().is_some_and(|b| b.friction_nm.is_some()) {
+        out.push(
+            "torques and wheel angle were sampled at the same instants, and the scale of driver_torque_nm is right to 30 %: beside \
+             friction the torques on the column tell no more"
+                .to_owned(),
+        );
+    }
     out.extend(too_little.map(|why| {
         format!("torques and wheel angle have their signs, scales and instants: the torques on the column could not be weighed ({why})")
     }));

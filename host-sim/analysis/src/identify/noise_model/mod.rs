@@ -12,7 +12,8 @@
 //! from the Gauss-Newton matrix, hold (Ljung, "System Identification", sections 8.3 and 13.4).
 //!
 //! A driver's own line lies beside the target line by an offset and by a part in proportion to the road's turn. The integral of
-//! e_y takes up both, and a fit without them has no gain_2; so both are always estimated (`signals` has the torques).
+//! e_y takes up both, and a fit without them has no gain_2; so both are estimated where the record shows a line, and held in
+//! the errors where it does not.
 //!
 //! The constant is (K_d + K_nms)*a_2 times what Int e_y was before the record began. The rows before
 //! [`LONGEST_DELAY_S`] + 5 t_nms are not used: there the delayed inputs, or what the muscle still remembers of
@@ -45,7 +46,7 @@ pub use information::{INFORMED, Information, Truth, information};
 use super::log::DriveLog;
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
-use super::result::{Identification, Start};
+use super::result::{Identification, SAME_LINE, Start};
 use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
 use super::signals::{Muscle, Signals};
 use super::switches::Switches;
@@ -109,6 +110,11 @@ const VARIATION_WIDTHS: [f64; COUNT] = [
 
 /// The turn of the road in a bend of 300 m at 60 km/h, rad/s: what a line in bends is judged by.
 pub(crate) const BEND_RAD_S: f64 = 60.0 / 3.6 / 300.0;
+/// What is known of a driver's own line where the record does not show one, m: its standard deviation about the target line on a
+/// straight road, and that of its part in a bend.
+const LINE_SD_M: f64 = 0.05;
+/// What a line has to add to twice the log likelihood before it is estimated: where gain_2 is weak, some line always adds a few.
+const LINE_LEVEL: f64 = 16.0;
 /// A driver's own line is within so much of the target line, m: the target line is in the same lane.
 const LARGEST_LINE_M: f64 = 1.5;
 /// A gain_2 below this, N.m/(m.s), does not tell where a driver's line is: the search then starts on the target line.
@@ -151,17 +157,18 @@ pub fn identify(log: &DriveLog, options: &Options) -> Identification {
 /// Identifies the driver of a log that was prepared.
 pub(crate) fn identify_prepared(prepared: &Prepared, options: &Options) -> Identification {
     let mut problem = Problem::new(prepared, options);
-    let (mut optimum, starts) = problem.search();
+    let (optimum, starts) = problem.search();
     problem.assume_muscle(&optimum.point);
-    // Once for K_nms and once for t_nms, at most.
-    for _ in 0..2 {
-        let Some(place) = problem.drawn(&optimum) else {
-            break;
-        };
-        optimum = problem.freed(place, &optimum);
+    if problem.line_is_evident(&optimum) {
+        return problem.with_line(prepared, options);
     }
-    optimum = problem.restrict(optimum);
-    problem.report(prepared, options, &optimum, starts)
+    let found = problem.found(prepared, options, optimum, starts);
+    // Before a line is said to move, it may be another one than the target line throughout.
+    let moves = found.refuted.iter().any(|r| r.assumption == SAME_LINE);
+    if moves && problem.line_may_be_freed() {
+        return Problem::new(prepared, options).with_line(prepared, options);
+    }
+    found
 }
 
 /// Something that is not known exactly although nobody asked for an estimate.
@@ -176,7 +183,7 @@ struct Assumed {
 struct Problem<'a> {
     log: &'a DriveLog,
     muscle: Muscle,
-    /// What is taken as known give or take something: K_nms, t_nms, the instants of a probe's switches.
+    /// What is taken as known give or take something: K_nms, t_nms, the instants of a probe's switches, the driver's line.
     assumed: Vec<Assumed>,
     signals: Signals,
     bounds: Vec<Bounds>,
@@ -189,6 +196,32 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
+    /// The identification with a line of the driver's own.
+    fn with_line(&mut self, prepared: &Prepared, options: &Options) -> Identification {
+        self.free_line();
+        let (optimum, starts) = self.search();
+        self.assume_muscle(&optimum.point);
+        self.found(prepared, options, optimum, starts)
+    }
+
+    /// The identification from where the search ended: with what the record draws away from what was assumed, and the
+    /// disturbance's corner.
+    fn found(
+        &mut self,
+        prepared: &Prepared,
+        options: &Options,
+        mut optimum: Optimum,
+        starts: Vec<Start>,
+    ) -> Identification {
+        // Once for K_nms and once for t_nms, at most.
+        for _ in 0..2 {
+            let Some(place) = self.drawn(&optimum) else { break };
+            optimum = self.freed(place, &optimum);
+        }
+        optimum = self.restrict(optimum);
+        self.report(prepared, options, &optimum, starts)
+    }
+
     fn new(prepared: &'a Prepared, options: &Options) -> Self {
         let log = &prepared.log;
         let muscle = options.muscle;
@@ -205,8 +238,6 @@ impl<'a> Problem<'a> {
         bounds[..3].fill(Bounds::new(0.0, f64::INFINITY));
         bounds[K_HG] = Bounds::new(0.0, 1.0);
         bounds[T_P] = Bounds::new(0.0, LONGEST_DELAY_S);
-        bounds[OWN_OFFSET] = Bounds::new(-LARGEST_LINE_M, LARGEST_LINE_M);
-        bounds[OWN_BEND] = Bounds::new(-LARGEST_LINE_M / BEND_RAD_S, LARGEST_LINE_M / BEND_RAD_S);
         bounds[RHO] = Bounds::new(0.0, 0.999_99);
         bounds[THETA] = Bounds::new(0.0, 0.99);
         let pin = |b: &mut Bounds, value: Option<f64>| {
@@ -222,8 +253,9 @@ impl<'a> Problem<'a> {
         }
         pin(&mut bounds[K_HG], options.k_hg.or(options.manual.then_some(0.0)));
         pin(&mut bounds[T_P], options.t_p_s);
-        pin(&mut bounds[OWN_OFFSET], options.line[0]);
-        pin(&mut bounds[OWN_BEND], options.line[1]);
+        // The target line, unless the record shows another one.
+        pin(&mut bounds[OWN_OFFSET], options.line[0].or(Some(0.0)));
+        pin(&mut bounds[OWN_BEND], options.line[1].or(Some(0.0)));
         let known = [muscle.k_nms, muscle.t_nms_s, options.late_s[0], options.late_s[1]];
         for (i, (&value, range)) in known.iter().zip(&options.estimate).enumerate() {
             bounds[K_NMS + i] = range.map_or(Bounds::new(value, value), |[low, high]| Bounds::new(low, high));
@@ -231,6 +263,7 @@ impl<'a> Problem<'a> {
         let untimed = Switches::of(log).are_untimed();
         // Anywhere in a row: its standard deviation is that over the root of twelve.
         let of_row_s = log.dt_s / 12.0_f64.sqrt();
+        let [offset, bend] = options.line.map(|l| l.is_none());
         let assumed = [
             (!options.k_nms_known, K_NMS, muscle.k_nms, K_NMS_SD),
             (!options.t_nms_known, T_NMS, muscle.t_nms_s, T_NMS_SD_S),
@@ -240,6 +273,8 @@ impl<'a> Problem<'a> {
                 options.late_s[0],
                 of_row_s,
             ),
+            (offset, OWN_OFFSET, 0.0, LINE_SD_M),
+            (bend, OWN_BEND, 0.0, LINE_SD_M / BEND_RAD_S),
         ];
         let assumed = assumed.into_iter().filter(|a| a.0);
         Self {
@@ -269,6 +304,49 @@ impl<'a> Problem<'a> {
         let freed = minimise(&from.point, &bounds, TOLERANCE, |p| self.evaluate(p));
         self.assume_muscle(&freed.point);
         freed
+    }
+
+    /// Whether a line of the driver's own explains more than chance does, with all else that is linear following.
+    fn line_is_evident(&self, optimum: &Optimum) -> bool {
+        let p = &optimum.point;
+        let mut bounds = self.bounds.clone();
+        let own = || {
+            self.assumed
+                .iter()
+                .map(|a| a.place)
+                .filter(|i| [OWN_OFFSET, OWN_BEND].contains(i))
+        };
+        own().for_each(|i| bounds[i] = Bounds::FREE);
+        // Without its bound: gain_2 rests on it where there is a line.
+        bounds[1].low = f64::NEG_INFINITY;
+        let quadratics = Delays::new(self, p, Line::Torques).at(&[p[T_P]]);
+        let gain: f64 = quadratics
+            .iter()
+            .map(|q| {
+                let d = step(p, &bounds, q, 0.0);
+                -q.gradient.dot(&d) - 0.5 * d.dot(&(&q.hessian * &d))
+            })
+            .sum();
+        let variance =
+            (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2));
+        self.line_may_be_freed() && 2.0 * gain / variance > LINE_LEVEL
+    }
+
+    fn line_may_be_freed(&self) -> bool {
+        self.assumed
+            .iter()
+            .any(|a| [OWN_OFFSET, OWN_BEND].contains(&a.place))
+    }
+
+    /// Lets the driver have a line of his own, of which nothing is known but that it is in the lane.
+    fn free_line(&mut self) {
+        for (i, scale) in [(OWN_OFFSET, 1.0), (OWN_BEND, 1.0 / BEND_RAD_S)] {
+            if self.assumed.iter().any(|a| a.place == i) {
+                self.bounds[i] = Bounds::new(-LARGEST_LINE_M * scale, LARGEST_LINE_M * scale);
+            }
+        }
+        self.assumed
+            .retain(|a| ![OWN_OFFSET, OWN_BEND].contains(&a.place));
     }
 
     fn is_free(&self, i: usize) -> bool {

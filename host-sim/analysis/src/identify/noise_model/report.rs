@@ -150,11 +150,34 @@ impl Problem<'_> {
             parameters,
             beyond: beyond.collect(),
             line: OwnLine {
-                offset: parameter(OWN_OFFSET),
-                bend: parameter(OWN_BEND).scaled(BEND_RAD_S),
+                offset: self
+                    .own_line(OWN_OFFSET, found)
+                    .unwrap_or_else(|| parameter(OWN_OFFSET)),
+                bend: self
+                    .own_line(OWN_BEND, found)
+                    .unwrap_or_else(|| parameter(OWN_BEND))
+                    .scaled(BEND_RAD_S),
             },
             not_split: split.err(),
         }
+    }
+
+    /// What the record says of a line that it does not show, beside what is known of it; none of one that is estimated or given.
+    fn own_line(&self, place: usize, found: &Uncertainty) -> Option<Parameter> {
+        let known = self.assumed.iter().find(|a| a.place == place)?;
+        let Some(a) = found.alternatives.iter().find(|a| a.place == place) else {
+            return Some(Parameter::not_identified(known.value, Bounds::FREE));
+        };
+        let share = known.sd.powi(2) / (known.sd.powi(2) + a.error.powi(2));
+        let (step, variance) = (a.step * share, a.error.powi(2) * share);
+        Some(Parameter::estimated(
+            step,
+            0.0,
+            variance,
+            0.0,
+            Bounds::FREE,
+            VARIATION_WIDTHS[place],
+        ))
     }
 
     /// The combinations that are determined where K_hg alone is not.

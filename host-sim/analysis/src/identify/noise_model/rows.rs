@@ -51,7 +51,6 @@ impl<const N: usize> Block<N> {
 
     /// Derivatives by what is always searched, and the disturbance; `arm` is the arm's torque. Plain loops over whole blocks, which
     /// the compiler makes wide; what lies behind the last row is cut off by the filter.
-    #[expect(clippy::needless_range_loop, reason = "loops over several arrays at once")]
     fn fill(
         &mut self,
         problem: &Problem<'_>,
