@@ -3,13 +3,9 @@
 use super::{Field, suffix};
 
 /// Names that older files have, where they are not the name without its unit or had another unit: table, old name, new name, old unit, and how much of the new unit that is.
-const OLD_NAMES: [(&str, &str, &str, &str, f64); 22] = [
+const OLD_NAMES: [(&str, &str, &str, &str, f64); 18] = [
     ("", "lane_width", "lane_width_m", "", 1.0),
     ("", "speed", "speed_m_per_s", "km/h", 1.0 / 3.6),
-    ("", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
-    ("tuning", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
-    ("training", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
-    ("held_out", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
     ("speed", "kmh", "speed_m_per_s", "km/h", 1.0 / 3.6),
     ("speed", "time", "time_s", "", 1.0),
     ("speed", "place", "place_m", "", 1.0),
