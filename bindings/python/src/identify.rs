@@ -81,6 +81,7 @@ impl How<'_> {
                 .map(|scenario| single_track(&scenario.get().inner)),
             manual: self.manual,
             stretches: &options.stretches,
+            watch: None,
         };
         match drive {
             Drive::File(path) => {

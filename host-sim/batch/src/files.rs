@@ -104,6 +104,33 @@ impl<'a> Source<'a> {
         in_range(field, value, low..=high, unit).map_err(|e| self.bad(e))
     }
 
+    /// A list of speeds, m/s, that a file gives in one of two units.
+    pub(crate) fn speeds(
+        &self,
+        table: &str,
+        m_per_s: Option<&Vec<f64>>,
+        kmh: Option<&Vec<f64>>,
+    ) -> Result<Vec<f64>, InputError> {
+        let (name, speeds) = match (m_per_s, kmh) {
+            (Some(speeds), None) => ("speeds_m_per_s", speeds.clone()),
+            (None, Some(speeds)) => {
+                // In the unit that the file has; in m/s each scenario says its range.
+                for kmh in speeds {
+                    self.within(&format!("{table}speeds_kmh"), *kmh, 19.8, 252.0, "km/h")?;
+                }
+                ("speeds_kmh", speeds.iter().map(|kmh| kmh / 3.6).collect())
+            }
+            _ => {
+                let names = format!("{table}speeds_m_per_s, {table}speeds_kmh");
+                return Err(self.bad(format!("{names}: one of them is wanted, a list of numbers")));
+            }
+        };
+        if speeds.is_empty() {
+            return Err(self.bad(format!("{table}{name} = []: one at least is wanted")));
+        }
+        Ok(speeds)
+    }
+
     pub(crate) fn count(&self, field: &str, value: u64, low: f64, high: f64) -> Result<u32, InputError> {
         self.within(field, value as f64, low, high, "")?;
         Ok(value as u32)

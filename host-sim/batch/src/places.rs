@@ -45,6 +45,7 @@ pub(crate) fn drives(
         "course",
         "speed",
         "speed_m_per_s",
+        "speed_kmh",
         "failure",
         "driver_change",
     ] {

@@ -76,6 +76,10 @@ pub struct RealDrive {
     pub by_hand: bool,
     /// Why nothing was identified.
     pub refused: Option<String>,
+    /// What was found when it was read: what, found, done; empty if reading refused it.
+    pub reading: Vec<[String; 3]>,
+    /// What was converted or computed, in sentences.
+    pub notes: Vec<String>,
     /// What was found, if it was not refused.
     pub found: Option<Found>,
 }
@@ -175,20 +179,18 @@ fn of_file<'a>(
         hands: None,
     };
     let file = path.strip_prefix(directory).unwrap_or(path).display().to_string();
-    let drive = |layout: &str, by_hand, found: Result<Found, StudyError>| {
-        let (refused, found) =
-            found.map_or_else(|why| (Some(why.to_string()), None), |found| (None, Some(found)));
-        RealDrive {
-            file: file.clone(),
-            layout: layout.into(),
-            by_hand,
-            refused,
-            found,
-        }
+    let drive = |layout: &str, by_hand, why: Option<String>| RealDrive {
+        file: file.clone(),
+        layout: layout.into(),
+        by_hand,
+        refused: why,
+        reading: Vec::new(),
+        notes: Vec::new(),
+        found: None,
     };
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
-        Err(error) => return refused(drive("", true, Err(error.to_string().into()))),
+        Err(error) => return refused(drive("", true, Some(error.to_string()))),
     };
     let format = Format::from_path(path).ok();
     let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format, maps)) else {
@@ -197,7 +199,7 @@ fn of_file<'a>(
             Err(error) if !error.to_string().contains("there is no channel time_s") => error.to_string(),
             _ => "it has the channels of no layout that needs no --map".to_owned(),
         };
-        return refused(drive("", true, Err(why.into())));
+        return refused(drive("", true, Some(why)));
     };
     let rows = Rows::read(layout, &bytes, format, maps);
     let hands = rows.map(|rows| {
@@ -212,14 +214,25 @@ fn of_file<'a>(
             stretches: &understood.stretches,
             ..Recording::default()
         };
-        let log = open_mapped(path, Some(layout), maps, &how).map_err(|e| {
-            let why = e.to_string();
-            let place = format!("{}: ", path.display());
-            why.strip_prefix(&place).map_or(why.clone(), str::to_owned)
-        })?;
-        judge(&log.0, by_hand, understood)
+        let (log, notes) = match open_mapped(path, Some(layout), maps, &how) {
+            Ok(read) => read,
+            Err(error) => {
+                let why = error.to_string();
+                let place = format!("{}: ", path.display());
+                let why = why.strip_prefix(&place).map_or(why.clone(), str::to_owned);
+                return drive(&layout.name, by_hand, Some(why));
+            }
+        };
+        let judged = judge(&log, by_hand, understood);
+        RealDrive {
+            reading: log.findings,
+            notes,
+            refused: judged.as_ref().err().map(ToString::to_string),
+            found: judged.ok(),
+            ..drive(&layout.name, by_hand, None)
+        }
     };
-    let parts = [true, false].map(|by_hand| drive(&layout.name, by_hand, judged(by_hand)));
+    let parts = [true, false].map(judged);
     let [hand, shared] = &parts;
     // What is wrong with the file as a whole is said once.
     let same = hand.refused.is_some() && hand.refused == shared.refused;

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use haptic_log::bus::BusFrame;
 use haptic_log::formats::dbc::{self, Signals};
-use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
+use haptic_log::formats::{self, BusLog, Contents, Format, Reading, Watch};
 use haptic_log::notes::Note;
 use haptic_log::recording::Recording;
 
@@ -178,8 +178,7 @@ fn buses_are_written_back() {
     for extension in ["asc", "blf"] {
         let path = place.path().join(format!("x.{extension}"));
         let (count, told) = formats::write_frames(&path, &log("x.log", text.into())).unwrap();
-        let Contents::Frames(again) =
-            formats::read(&path, Reading::default(), |file| Box::new(file)).unwrap()
+        let Contents::Frames(again) = formats::read(&path, Reading::default(), &Watch::default()).unwrap()
         else {
             panic!("{extension}: no frames");
         };

@@ -1,14 +1,12 @@
 //! How a command works through its drives: on how many threads, and under a progress bar on stderr; no bar where stderr is no
 //! terminal.
 
-use std::fs::File;
-use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use clap::Args;
 use haptic_batch::engine::{Progress, Watch, on_threads};
-use haptic_log::formats::BusLog;
+use haptic_log::formats::{self, BusLog};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::BadInput;
@@ -51,16 +49,26 @@ pub fn watched<T>(unit: &str, work: impl FnOnce(&Watch<'_>) -> T) -> T {
 
 /// A log whose reading moves a bar; a second reading begins anew.
 pub(super) fn of_log(log: BusLog) -> (BusLog, ProgressBar) {
-    let size = log.size();
+    let (watch, bar) = over_bytes(log.size());
+    (log.watched(watch), bar)
+}
+
+/// A bar over the bytes of a file, and who moves it.
+pub(super) fn of_file(path: &Path) -> (formats::Watch, ProgressBar) {
+    over_bytes(std::fs::metadata(path).map_or(0, |known| known.len()))
+}
+
+/// A second reading begins anew.
+fn over_bytes(size: u64) -> (formats::Watch, ProgressBar) {
     let bar = styled(size, "{bar:40} {bytes}/{total_bytes} read, {elapsed}");
     let moved = bar.clone();
-    let watch = move |read| {
+    let watch = formats::Watch::new(move |read| {
         if moved.position() >= size {
             moved.set_position(0);
         }
         moved.inc(read);
-    };
-    (log.watched(watch), bar)
+    });
+    (watch, bar)
 }
 
 /// A bar of `length` steps.
@@ -73,12 +81,4 @@ pub(super) fn styled(length: u64, template: &str) -> ProgressBar {
     // A template that does not parse would only cost the bar its looks.
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length).with_style(style)
-}
-
-/// A bar over the bytes of a file, and what shows there how far its reader is.
-pub(super) fn reading(path: &Path) -> (ProgressBar, impl FnOnce(File) -> Box<dyn Read> + use<>) {
-    let size = std::fs::metadata(path).map_or(0, |known| known.len());
-    let bar = styled(size, "{bar:40} {bytes}/{total_bytes} read, {elapsed}");
-    let own = bar.clone();
-    (bar, move |file| Box::new(own.wrap_read(file)))
 }

@@ -1,7 +1,5 @@
 //! A recorded drive as an argument: the file, and what its channels and frames are; everywhere the same options.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -111,14 +109,18 @@ impl ReadingArguments {
         vehicle: Option<&Path>,
     ) -> Result<(DriveLog, Vec<String>), BadInput> {
         let vehicle = vehicle.map(load_scenario).transpose()?;
+        let (watch, bar) = progress::of_file(path);
         let how = How {
             dbc: self.dbc.as_deref(),
             bus: self.bus.as_deref(),
             vehicle: vehicle.as_ref().map(single_track),
             manual,
             stretches,
+            watch: Some(&watch),
         };
-        Ok(open_mapped(path, self.layout()?.as_ref(), &self.maps()?, &how)?)
+        let read = open_mapped(path, self.layout()?.as_ref(), &self.maps()?, &how);
+        bar.finish_and_clear();
+        Ok(read?)
     }
 
     /// Whether a file is to be understood otherwise than it says itself.
@@ -153,8 +155,8 @@ impl ReadingArguments {
             time: time.as_ref(),
             only: None,
         };
-        let (bar, through) = progress::reading(path);
-        let contents = formats::read(path, reading, |file: File| -> Box<dyn Read> { through(file) });
+        let (watch, bar) = progress::of_file(path);
+        let contents = formats::read(path, reading, &watch);
         bar.finish_and_clear();
         Ok(match contents? {
             Contents::Frames(log) => {

@@ -11,6 +11,7 @@
 //! - `rust` runs as a doctest of `host-sim`. `rust file=PATH` and `python file=PATH` are a part of that file.
 //! - `text output`: lines, or beginnings of lines, that the commands before it printed; how many blanks lie between words does not
 //!   matter.
+//! - A sentence's numbers are compared by `<!-- of: COMMAND -->`: see `passages`.
 //! - `text`, `mermaid`, `math` and blocks without a word are not for running.
 //!
 //! Commands that take long run shorter here: [`SHORTER`].
@@ -18,6 +19,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::passages::passages;
 use super::{documents, place, root, run};
 use crate::{EVIDENCE, built, program};
 
@@ -226,6 +228,7 @@ fn run_examples(name: &Path, text: &str) {
     let place = place();
     let mut seen = 0;
     let mut printed = Vec::new();
+    let mut of_line: Vec<(String, String)> = Vec::new();
     for block in blocks(text) {
         let at = format!("{}:{}", name.display(), block.line);
         match block.language() {
@@ -244,6 +247,7 @@ fn run_examples(name: &Path, text: &str) {
                     } else {
                         let text = run_line(line, &block, place.path(), &at);
                         printed.extend(text.lines().map(evenly));
+                        of_line.push((line.into(), text));
                     }
                     seen += 1;
                 }
@@ -269,7 +273,27 @@ fn run_examples(name: &Path, text: &str) {
             other => panic!("{at}: nobody runs {other}"),
         }
     }
+    check_passages(name, text, &of_line, place.path());
     println!("{}: {seen} commands", name.display());
+}
+
+/// What the commands of a document printed has the numbers of its passages.
+fn check_passages(name: &Path, text: &str, printed: &[(String, String)], place: &Path) {
+    for passage in passages(text) {
+        let command = passage.command;
+        let at = format!("{}: {command}", name.display());
+        let own = printed.iter().find(|(line, _)| line.contains(command));
+        let alone = Block {
+            line: 0,
+            info: "sh".into(),
+            text: String::new(),
+        };
+        let wrong = match own {
+            Some((_, printed)) => passage.wrong(printed),
+            None => passage.wrong(&run_line(command, &alone, place, &at)),
+        };
+        assert!(wrong.is_empty(), "{at}: it did not print {wrong:?}");
+    }
 }
 
 #[test]

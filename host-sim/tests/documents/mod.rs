@@ -4,6 +4,7 @@
 mod examples;
 mod links;
 mod numbers;
+mod passages;
 mod terms;
 
 use std::collections::BTreeMap;

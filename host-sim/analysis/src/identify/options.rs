@@ -162,7 +162,8 @@ impl Options {
             .map_err(|_| FixError(format!("--fix {name}: {text:?} is not a number")))?;
         if !(low..=high).contains(&value) {
             return Err(FixError(format!(
-                "--fix {name}: {value} is outside {low} to {high}"
+                "--fix {name}: {} is outside {low} to {high}",
+                text.trim()
             )));
         }
         match name {

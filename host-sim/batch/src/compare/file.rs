@@ -21,7 +21,8 @@ struct File {
     seed: u64,
     seeds: u64,
     roads: Vec<String>,
-    speeds_m_per_s: Vec<f64>,
+    speeds_m_per_s: Option<Vec<f64>>,
+    speeds_kmh: Option<Vec<f64>>,
     #[serde(default)]
     scenario: Table,
     #[serde(default)]
@@ -47,7 +48,8 @@ struct TuningFile {
     budget: u64,
     seeds: u64,
     roads: Vec<String>,
-    speeds_m_per_s: Vec<f64>,
+    speeds_m_per_s: Option<Vec<f64>>,
+    speeds_kmh: Option<Vec<f64>>,
     weights: Option<BTreeMap<String, f64>>,
 }
 
@@ -113,9 +115,9 @@ fn oracles(source: &Source, laws: &[Table]) -> Result<(Vec<Table>, Vec<bool>), I
 
 /// Names of the worlds, and the drives in each, one world behind the other; one world without a name if the file has none.
 fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputError> {
-    let drives = |source: &Source, fields: &Table| {
-        drives(source, "", fields, &file.roads, &file.speeds_m_per_s, file.seeds)
-    };
+    let speeds = source.speeds("", file.speeds_m_per_s.as_ref(), file.speeds_kmh.as_ref())?;
+    let drives =
+        |source: &Source, fields: &Table| drives(source, "", fields, &file.roads, &speeds, file.seeds);
     if file.world.is_empty() {
         return Ok((vec![String::new()], drives(source, &file.scenario)?));
     }
@@ -178,16 +180,10 @@ fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning
         source.within(&format!("tuning.weights.{name}"), weight, 0.0, 1e6, "")?;
         weights[place] = weight;
     }
+    let speeds = source.speeds("tuning.", file.speeds_m_per_s.as_ref(), file.speeds_kmh.as_ref())?;
     Ok(Tuning {
         budget: source.count("tuning.budget", file.budget, 1.0, 10_000.0)?,
-        drives: drives(
-            source,
-            "tuning.",
-            scenario,
-            &file.roads,
-            &file.speeds_m_per_s,
-            file.seeds,
-        )?,
+        drives: drives(source, "tuning.", scenario, &file.roads, &speeds, file.seeds)?,
         weights,
     })
 }

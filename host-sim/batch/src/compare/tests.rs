@@ -75,6 +75,22 @@ fn any_number_of_threads_gives_the_same_results() {
     assert_eq!(one.rows.len(), 16);
 }
 
+#[test]
+fn speeds_in_kilometres_an_hour_are_the_same_drives() {
+    let text = FILE.replacen(
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_kmh = [50, 60]",
+        1,
+    );
+    let kinds = Kinds::default();
+    let speeds = |text: &str| -> Vec<f64> {
+        let places = compare(text, &kinds).unwrap().judged.places;
+        places.into_iter().map(|(_, kmh, _)| kmh).collect()
+    };
+    assert_eq!(speeds(&text), [50.0, 60.0]);
+    assert_eq!(speeds(&text), speeds(FILE));
+}
+
 /// The first drive, driven by itself by other means: its peaks without failure, and after each failure.
 #[test]
 fn a_drive_and_its_failures_are_those_of_the_simulator() {
@@ -267,7 +283,7 @@ fn a_law_of_one_s_own_joins() {
 }
 
 /// What stands in the file, what stands there instead, and what is said of it.
-const WRONG: [(&str, &str, &str); 26] = [
+const WRONG: [(&str, &str, &str); 31] = [
     (
         "k_1 = 0.25",
         "oracle = 1",
@@ -341,6 +357,31 @@ const WRONG: [(&str, &str, &str); 26] = [
         "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
         "speeds_m_per_s = [83.33333333333333]",
         "speed_m_per_s = 83.33333333333333 m/s is outside 5.5 to 70 m/s",
+    ),
+    (
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_kmh = []",
+        "speeds_kmh = []: one at least is wanted",
+    ),
+    (
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_kmh = [60, 300]",
+        "speeds_kmh = 300 km/h is outside 19.8 to 252 km/h",
+    ),
+    (
+        "seeds = 2",
+        "seeds = 2\nspeeds_kmh = [60]",
+        "speeds_m_per_s, speeds_kmh: one of them is wanted",
+    ),
+    (
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "",
+        "speeds_m_per_s, speeds_kmh: one of them is wanted",
+    ),
+    (
+        "[scenario]\n",
+        "[scenario]\nspeed_kmh = 60\n",
+        "scenario.speed_kmh: this file has its own seeds",
     ),
     ("['road.toml']", "['lost.toml']", "lost.toml"),
     (

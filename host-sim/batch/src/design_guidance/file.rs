@@ -53,7 +53,8 @@ struct Search {
 struct StageFile {
     seeds: u64,
     roads: Vec<String>,
-    speeds_m_per_s: Vec<f64>,
+    speeds_m_per_s: Option<Vec<f64>>,
+    speeds_kmh: Option<Vec<f64>>,
     losses: u64,
 }
 
@@ -69,13 +70,14 @@ pub(super) fn from_text(
     }
     let share = own_line_share.unwrap_or(file.population.own_line_share);
     let stage = |stream, table: &str, file_of: &StageFile, share, turn| {
-        let (roads, speeds_m_per_s) = (&file_of.roads, &file_of.speeds_m_per_s);
+        let (m_per_s, kmh) = (&file_of.speeds_m_per_s, &file_of.speeds_kmh);
+        let speeds = source.speeds(table, m_per_s.as_ref(), kmh.as_ref())?;
         let drives = drives(
             source,
             table,
             &file.scenario,
-            roads,
-            speeds_m_per_s,
+            &file_of.roads,
+            &speeds,
             file_of.seeds,
         )?;
         let places = drives.places.into_iter();

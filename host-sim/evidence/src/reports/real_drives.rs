@@ -18,6 +18,7 @@ pub(crate) fn report(found: &RealDrives) -> Report {
         Block::figure("predictions", predictions(found), caption),
         Block::Table(drives(found)),
         Block::Table(refused(found)),
+        Block::Table(read(found)),
     ];
     let sections = [
         ("Summary", summary(found)),
@@ -218,6 +219,32 @@ fn refused(found: &RealDrives) -> Table {
         Some(["Recording", "Driving", "Cause"].into_iter().zip(cells))
     };
     Table::of_rows("Refused.", found.drives.iter().filter_map(row))
+}
+
+/// What reading found in each file; what is so by hand and shared stands there once.
+fn read(found: &RealDrives) -> Table {
+    let mut rows: Vec<[&str; 4]> = Vec::new();
+    for drive in &found.drives {
+        let findings = drive
+            .reading
+            .iter()
+            .map(|finding| finding.each_ref().map(String::as_str));
+        let notes = drive.notes.iter().map(|note| ["", note.as_str(), ""]);
+        for [what, found, done] in findings.chain(notes) {
+            let row = [drive.file.as_str(), what, found, done];
+            if !rows.contains(&row) {
+                rows.push(row);
+            }
+        }
+    }
+    let headings = ["Recording", "What", "Found", "Done"];
+    let rows = rows
+        .into_iter()
+        .map(|row| headings.into_iter().zip(row.map(Cell::text)));
+    Table::of_rows(
+        "In the recordings: what was left out, converted, computed or mended.",
+        rows,
+    )
 }
 
 fn sources(found: &RealDrives) -> Table {

@@ -31,9 +31,27 @@ enum Input {
     Frames(Arc<[BusFrame]>, Notes),
 }
 
-/// Who is told of each part that is read, in bytes.
+/// Who is told of each part that is read, in bytes; nobody by default.
 #[derive(Clone)]
-struct Watch(Arc<dyn Fn(u64) + Send + Sync>);
+pub struct Watch(Arc<dyn Fn(u64) + Send + Sync>);
+
+impl Default for Watch {
+    fn default() -> Self {
+        Self::new(|_| ())
+    }
+}
+
+impl Watch {
+    /// Tells `watch`.
+    pub fn new(watch: impl Fn(u64) + Send + Sync + 'static) -> Self {
+        Self(Arc::new(watch))
+    }
+
+    /// An input whose reading is watched.
+    pub fn over<'a>(&'a self, input: impl Read + 'a) -> impl Read + 'a {
+        Watched(input, self)
+    }
+}
 
 impl fmt::Debug for Watch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -59,7 +77,7 @@ impl BusLog {
             format,
             bus: None,
             stretches: Vec::new(),
-            watch: Watch(Arc::new(|_| ())),
+            watch: Watch::default(),
         }
     }
 
@@ -98,10 +116,10 @@ impl BusLog {
         self
     }
 
-    /// Tells `watch` of each part that is read, in bytes.
+    /// Tells `watch` of each part that is read.
     #[must_use]
-    pub fn watched(mut self, watch: impl Fn(u64) + Send + Sync + 'static) -> Self {
-        self.watch = Watch(Arc::new(watch));
+    pub fn watched(mut self, watch: Watch) -> Self {
+        self.watch = watch;
         self
     }
 
@@ -156,7 +174,7 @@ impl BusLog {
 
     fn read(&self, input: impl Read, take: &mut Take<'_>) -> Result<Notes, RecordingError> {
         let (mut input, bus) = (
-            BufReader::with_capacity(1 << 16, Watched(input, &self.watch)),
+            BufReader::with_capacity(1 << 16, self.watch.over(input)),
             self.bus.as_deref(),
         );
         match self.format {

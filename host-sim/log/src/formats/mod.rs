@@ -33,7 +33,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-pub use bus_log::{BusLog, write_frames};
+pub use bus_log::{BusLog, Watch, write_frames};
 use write::replaced;
 pub use write::{to_csv, write};
 
@@ -160,22 +160,18 @@ struct Table {
     notes: Notes,
 }
 
-/// Reads the file at `path`; `through` may look at what is read, to show how far it is.
+/// Reads the file at `path`; `watch` is told how far.
 ///
 /// # Errors
 /// What cannot be read, with the file, and the channel where one is the reason.
-pub fn read(
-    path: &Path,
-    reading: Reading<'_>,
-    through: impl FnOnce(File) -> Box<dyn Read>,
-) -> Result<Contents, RecordingError> {
+pub fn read(path: &Path, reading: Reading<'_>, watch: &Watch) -> Result<Contents, RecordingError> {
     let format = Format::from_path(path)?;
     let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
     if format.holds_frames() {
         return Ok(Contents::Frames(BusLog::of_file(path, format).map_err(named)?));
     }
     let file = File::open(path).map_err(|e| named(e.to_string().into()))?;
-    read_from(through(file), format, reading).map_err(named)
+    read_from(watch.over(file), format, reading).map_err(named)
 }
 
 /// Reads what a source has.

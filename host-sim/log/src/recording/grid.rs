@@ -145,7 +145,7 @@ impl Seen {
 const ROUNDED_S: f64 = 1e-6;
 
 /// Instants at one distance, over the time that all channels cover.
-pub(crate) struct Grid {
+pub struct Grid {
     from_s: f64,
     rate_hz: f64,
     rows: usize,
@@ -153,6 +153,17 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
+    /// So many instants from `from_s` on. Between values farther apart than `longest_s` there is none.
+    #[must_use]
+    pub const fn even(from_s: f64, rate_hz: f64, rows: usize, longest_s: f64) -> Self {
+        Self {
+            from_s,
+            rate_hz,
+            rows,
+            longest_s,
+        }
+    }
+
     /// The grid of these channels.
     ///
     /// # Errors
@@ -207,7 +218,7 @@ impl Grid {
 }
 
 /// A channel on a grid, from values that come in the order of their time: as held, or on the line between neighbours.
-pub(crate) struct OnGrid {
+pub struct OnGrid {
     is_held: bool,
     /// The latest value. One that comes at its instant takes its place.
     last: Option<(f64, f64)>,
@@ -215,7 +226,9 @@ pub(crate) struct OnGrid {
 }
 
 impl OnGrid {
-    pub(crate) const fn new(is_held: bool) -> Self {
+    /// A channel whose values are held, or lie on lines.
+    #[must_use]
+    pub const fn new(is_held: bool) -> Self {
         Self {
             is_held,
             last: None,
@@ -223,7 +236,8 @@ impl OnGrid {
         }
     }
 
-    pub(crate) fn take(&mut self, grid: &Grid, time_s: f64, value: f64) {
+    /// Takes the next value.
+    pub fn take(&mut self, grid: &Grid, time_s: f64, value: f64) {
         let next = (time_s, value);
         if let Some(last) = self.last.filter(|last| last.0 < time_s) {
             self.fill(grid, last, Some(next));
@@ -248,7 +262,9 @@ impl OnGrid {
         }
     }
 
-    pub(crate) fn finish(mut self, grid: &Grid) -> Vec<f64> {
+    /// The value at each instant; none if no value came.
+    #[must_use]
+    pub fn finish(mut self, grid: &Grid) -> Vec<f64> {
         if let Some(last) = self.last {
             self.fill(grid, last, None);
         }

@@ -5,7 +5,7 @@
 //! the channels mean.
 
 mod chosen;
-pub(crate) mod grid;
+pub mod grid;
 mod stamps;
 mod term;
 
@@ -210,6 +210,9 @@ impl Recording {
                 .left_out(units::bare(name))
                 .unwrap_or_else(|| format!("there is no channel {name}{}", self.near(name)))
                 .into()),
+            [(first, a), (second, b), ..] if std::ptr::eq(first, second) && a.name == b.name => {
+                Err(format!("channel {name} is there twice").into())
+            }
             [(first, a), (second, b), ..] if std::ptr::eq(first, second) => Err(format!(
                 "channel {name} is there twice, as {} and as {}: say which",
                 a.name, b.name

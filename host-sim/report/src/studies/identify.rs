@@ -156,15 +156,22 @@ fn correlogram(found: &Identification) -> Figure {
     Axis::counting("Lag (samples)").figure([panel])
 }
 
+/// Points of a curve of the driver over time, who changes over seconds: more than are seen.
+const MOST_POINTS: usize = 20_000;
+
 fn followed(drive: &IdentifiedDrive) -> Figure {
     let t = &drive.tracking;
+    let every = t.time_s.len().div_ceil(MOST_POINTS).max(1);
+    let some = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
+    let time_s = some(&t.time_s);
     let panel = |name: &str, unit: &str, h: &History| {
-        let both = h.estimate.iter().zip(&h.standard_deviation);
+        let (estimate, deviation) = (some(&h.estimate), some(&h.standard_deviation));
+        let both = estimate.iter().zip(&deviation);
         let ends: Vec<[f64; 2]> = both.map(|(e, s)| [e - 2.0 * s, e + 2.0 * s]).collect();
-        let (x, ends) = broken(&t.time_s, &ends, [f64::NAN; 2]);
+        let (x, ends) = broken(&time_s, &ends, [f64::NAN; 2]);
         Axis::new(name, unit).panel([
             Series::interval("two standard deviations", 5, &x, &ends),
-            broken_line("estimate", 1, &t.time_s, &h.estimate),
+            broken_line("estimate", 1, &time_s, &estimate),
         ])
     };
     let panels = [

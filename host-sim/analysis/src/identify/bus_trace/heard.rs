@@ -5,30 +5,44 @@ use haptic_log::bus::BusFrame;
 use haptic_log::formats::dbc::{identifier, raw};
 
 use super::protection::Auditor;
-use super::{Course, LogError, refuse};
+use super::{AGE, E_THETA, E_Y, LogError, VALID, refuse};
+
+/// A value of a needed signal, in SI units.
+pub(super) struct Value {
+    /// Place of the signal in [`NEEDED`](super::NEEDED).
+    pub(super) signal: usize,
+    pub(super) line: u32,
+    /// When it was measured.
+    pub(super) time_s: f64,
+    pub(super) value: f64,
+}
 
 /// A message that carries signals that are needed.
 struct Carrier<'a> {
     message: &'a Message,
     bus: Option<String>,
     auditor: Auditor,
-    line: Vec<u32>,
-    time_s: Vec<f64>,
+    /// Frames whose signals were read.
+    read: usize,
     too_short: usize,
 }
 
-/// A needed signal, the place of its carrier, and its values in SI units.
+/// A needed signal, the place of its carrier, and its latest value.
 struct Needed<'a> {
     name: &'static str,
     signal: &'a Signal,
     carrier: usize,
-    value: Vec<f64>,
+    value: f64,
+    /// When the latest value that was handed on was measured.
+    last_s: f64,
 }
 
 /// What was heard of the signals that are needed.
 pub(super) struct Heard<'a> {
     carriers: Vec<Carrier<'a>>,
     needed: Vec<Needed<'a>>,
+    /// Frames of the lane preview that say that they are not valid.
+    not_valid: usize,
 }
 
 impl<'a> Heard<'a> {
@@ -37,6 +51,7 @@ impl<'a> Heard<'a> {
         let mut heard = Self {
             carriers: Vec::new(),
             needed: Vec::new(),
+            not_valid: 0,
         };
         for name in names {
             let mut messages = dbc.messages.iter();
@@ -51,8 +66,7 @@ impl<'a> Heard<'a> {
                     message,
                     bus: None,
                     auditor: Auditor::of(dbc, message),
-                    line: Vec::new(),
-                    time_s: Vec::new(),
+                    read: 0,
                     too_short: 0,
                 });
             }
@@ -60,14 +74,15 @@ impl<'a> Heard<'a> {
                 name,
                 signal,
                 carrier,
-                value: Vec::new(),
+                value: 0.0,
+                last_s: f64::NEG_INFINITY,
             });
         }
         Ok(heard)
     }
 
-    /// Takes what a frame says, if it is one of those that are needed.
-    pub(super) fn take(&mut self, frame: &BusFrame) -> Result<(), LogError> {
+    /// Hands on what a frame says, if it is one of those that are needed.
+    pub(super) fn take(&mut self, frame: &BusFrame, each: &mut dyn FnMut(&Value)) -> Result<(), LogError> {
         let own = (frame.id, frame.extended);
         let Some(place) = self.carriers.iter().position(|c| identifier(c.message.id) == own) else {
             return Ok(());
@@ -88,8 +103,7 @@ impl<'a> Heard<'a> {
             carrier.too_short += 1;
             return Ok(());
         }
-        carrier.line.push(u32::try_from(frame.line).unwrap_or(u32::MAX));
-        carrier.time_s.push(frame.time_s);
+        carrier.read += 1;
         for needed in self.needed.iter_mut().filter(|needed| needed.carrier == place) {
             let signal = needed.signal;
             let unit = match signal.unit.as_str() {
@@ -98,11 +112,43 @@ impl<'a> Heard<'a> {
                 _ => 1.0,
             };
             let bits = raw(signal, &frame.data).unwrap_or_default();
-            needed
-                .value
-                .push((bits as f64 * signal.factor + signal.offset) * unit);
+            needed.value = (bits as f64 * signal.factor + signal.offset) * unit;
         }
+        self.hand_on(place, frame, each);
         Ok(())
+    }
+
+    /// The values that a carrier brought: those of the lane where it is valid, at the time when the camera saw it.
+    fn hand_on(&mut self, carrier: usize, frame: &BusFrame, each: &mut dyn FnMut(&Value)) {
+        let line = u32::try_from(frame.line).unwrap_or(u32::MAX);
+        let (is_valid, age_s) = (self.needed[VALID].value != 0.0, self.needed[AGE].value);
+        for (signal, needed) in self.needed.iter_mut().enumerate() {
+            if needed.carrier != carrier {
+                continue;
+            }
+            let mut time_s = frame.time_s;
+            match signal {
+                VALID => {
+                    self.not_valid += usize::from(!is_valid);
+                    continue;
+                }
+                AGE => continue,
+                E_Y | E_THETA => {
+                    time_s -= age_s;
+                    if !is_valid || time_s <= needed.last_s {
+                        continue;
+                    }
+                }
+                _ => {}
+            }
+            needed.last_s = time_s;
+            each(&Value {
+                signal,
+                line,
+                time_s,
+                value: needed.value,
+            });
+        }
     }
 
     /// What became of the frames, in words.
@@ -117,33 +163,35 @@ impl<'a> Heard<'a> {
                 ]
             })
         };
-        let of = |carrier: &Carrier<'_>| [carrier.auditor.finding(&carrier.time_s), too_short(carrier)];
-        self.carriers.iter().flat_map(of).flatten().collect()
+        let not_valid = (self.not_valid > 0).then(|| {
+            [
+                "LanePreview".to_owned(),
+                format!("{} frames that say that they are not valid", self.not_valid),
+                "not used".to_owned(),
+            ]
+        });
+        let of = |carrier: &Carrier<'_>| [carrier.auditor.finding(), too_short(carrier)];
+        let each = self.carriers.iter().flat_map(of).flatten();
+        each.chain(not_valid).collect()
     }
 
-    /// The signals, in the order in which they were asked for.
-    pub(super) fn courses(self) -> Result<Vec<Course>, LogError> {
-        let carriers = self.carriers;
-        let course = |needed: Needed<'_>| {
-            let carrier = &carriers[needed.carrier];
-            let (message, name) = (carrier.message, needed.name);
-            if needed.value.len() < 2 {
-                let ((id, _), seen) = (identifier(message.id), carrier.auditor.frames());
-                return refuse(match seen {
+    /// # Errors
+    /// A signal without values.
+    pub(super) fn check(&self) -> Result<(), LogError> {
+        for needed in &self.needed {
+            let carrier = &self.carriers[needed.carrier];
+            if carrier.read < 2 {
+                let (message, name) = (carrier.message, needed.name);
+                let (id, _) = identifier(message.id);
+                return refuse(match carrier.auditor.frames() {
                     0 | 1 => format!("no frame {id:03X} ({}), so no {name}", message.name),
-                    _ => format!(
+                    seen => format!(
                         "none of {seen} frames {id:03X} ({}) has a right CRC and its length, so no {name}",
                         message.name
                     ),
                 });
             }
-            Ok(Course {
-                name,
-                line: carrier.line.clone(),
-                time_s: carrier.time_s.clone(),
-                value: needed.value,
-            })
-        };
-        self.needed.into_iter().map(course).collect()
+        }
+        Ok(())
     }
 }

@@ -23,8 +23,7 @@ pub(super) struct Auditor {
     repeated: usize,
     last_s: f64,
     last: Vec<u8>,
-    /// Of the frames that are used.
-    counters: Vec<u8>,
+    lost: Lost,
 }
 
 impl Auditor {
@@ -38,7 +37,7 @@ impl Auditor {
             repeated: 0,
             last_s: f64::NEG_INFINITY,
             last: Vec::new(),
-            counters: Vec::new(),
+            lost: Lost::default(),
         }
     }
 
@@ -65,12 +64,12 @@ impl Auditor {
         }
         self.last_s = frame.time_s;
         self.last.clone_from(&frame.data);
-        self.counters.push(frame.data[1] & 15);
+        self.lost.take(frame.time_s, frame.data[1] & 15);
         true
     }
 
-    /// In words: what, found, done; nothing for a message without fault. The times are those of the frames that are used.
-    pub(super) fn finding(&self, time_s: &[f64]) -> Option<[String; 3]> {
+    /// In words: what, found, done; nothing for a message without fault.
+    pub(super) fn finding(&self) -> Option<[String; 3]> {
         let Self {
             name,
             frames,
@@ -82,7 +81,7 @@ impl Auditor {
             let found = format!("{frames} frames without known protection");
             return Some([name.clone(), found, "used unchecked".to_owned()]);
         }
-        let lost = lost(time_s, &self.counters);
+        let lost = self.lost.count();
         (wrong_crc + repeated + lost > 0).then(|| {
             [
                 name.clone(),
@@ -108,22 +107,52 @@ fn data_ids(dbc: &Dbc, id: MessageId) -> Option<[u8; 16]> {
     bytes?.try_into().ok()
 }
 
+/// Frames that tell how far apart they usually are.
+const TELLING: usize = 1000;
+
 /// Frames that are not there: the counter says how many modulo 16, the time says how often it went round.
-fn lost(time_s: &[f64], counters: &[u8]) -> usize {
-    let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).collect();
-    if steps.is_empty() {
-        return 0;
+#[derive(Default)]
+struct Lost {
+    /// The latest frames: time, s, and counter.
+    frames: Vec<(f64, u8)>,
+    /// Usual time between two frames, once it is known, s.
+    period_s: Option<f64>,
+    /// Before the latest frames.
+    count: f64,
+}
+
+impl Lost {
+    fn take(&mut self, time_s: f64, counter: u8) {
+        self.frames.push((time_s, counter));
+        if self.frames.len() > TELLING {
+            let period_s = self.period_s();
+            self.count += self.among_the_latest(period_s);
+            self.period_s = Some(period_s);
+            self.frames.drain(..TELLING);
+        }
     }
-    let middle = steps.len() / 2;
-    let (_, &mut period, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let pairs = time_s.windows(2).zip(counters.windows(2));
-    let sum: f64 = pairs
-        .map(|(t, n)| {
-            let counted = f64::from(n[1].wrapping_sub(n[0]) & 15);
-            let by_time = (t[1] - t[0]) / period.max(1e-6);
+
+    fn count(&self) -> usize {
+        (self.count + self.among_the_latest(self.period_s())) as usize
+    }
+
+    fn period_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.frames.windows(2).map(|w| w[1].0 - w[0].0).collect();
+        let middle = steps.len() / 2;
+        match self.period_s {
+            None if !steps.is_empty() => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+            known => known.unwrap_or_default(),
+        }
+    }
+
+    fn among_the_latest(&self, period_s: f64) -> f64 {
+        let lost = |w: &[(f64, u8)]| {
+            let counted = f64::from(w[1].1.wrapping_sub(w[0].1) & 15);
+            // No period is shorter: stamps may be equal.
+            let by_time = (w[1].0 - w[0].0) / period_s.max(1e-6);
             let rounds = ((by_time - counted) / 16.0).round().max(0.0);
             (counted + 16.0 * rounds - 1.0).max(0.0)
-        })
-        .sum();
-    sum as usize
+        };
+        self.frames.windows(2).map(lost).sum()
+    }
 }

@@ -21,12 +21,14 @@ pub(super) type Row = [f64; COLUMNS];
 /// A matrix of the state.
 type Matrix<const N: usize> = [[f64; N]; N];
 
-/// The gain and innovation variance of a step, in units of the noise variance.
+/// The gain and the variances of a step, in units of the noise variance.
 #[derive(Debug, Clone, Copy)]
 struct Gain<const N: usize> {
     state: [f64; N],
     /// Variance of the innovation; infinite where the sample has no part.
     innovation: f64,
+    /// Predicted covariance of the level with the state.
+    level: [f64; N],
 }
 
 impl<const N: usize> Gain<N> {
@@ -44,9 +46,10 @@ impl<const N: usize> Gain<N> {
 pub(super) struct Filter<const N: usize> {
     /// What the state is a sample later.
     transition: Matrix<N>,
-    gains: Vec<Gain<N>>,
-    /// Predicted covariance at each sample.
-    predicted: Vec<Matrix<N>>,
+    /// The gains that differ: in a long record few do, for the filter settles.
+    different: Vec<Gain<N>>,
+    /// Which of them each sample has.
+    of_sample: Vec<u32>,
 }
 
 pub(super) fn factorial(n: usize) -> f64 {
@@ -84,22 +87,31 @@ impl<const N: usize> Filter<N> {
         let back = transposed(&transition);
         let mut p: Matrix<N> =
             std::array::from_fn(|i| std::array::from_fn(|j| if i == j { BEFORE } else { 0.0 }));
-        let mut gains: Vec<Gain<N>> = Vec::with_capacity(weight.len());
-        let mut predicted = Vec::with_capacity(weight.len());
-        let mut settled = false;
+        let mut different: Vec<Gain<N>> = Vec::new();
+        let mut of_sample = Vec::with_capacity(weight.len());
+        // How many samples the filter has been settled for.
+        let mut settled = None;
         let mut last_weight = f64::NAN;
         for &w in weight {
-            settled &= w == last_weight;
+            settled = settled.filter(|_| w == last_weight);
             last_weight = w;
-            predicted.push(p);
-            if settled {
-                gains.push(gains[gains.len() - 1]);
+            if let Some(samples) = settled {
+                if samples == 0 {
+                    let level = p[0];
+                    different.push(Gain {
+                        level,
+                        ..different[different.len() - 1]
+                    });
+                }
+                settled = Some(samples + 1);
+                of_sample.push((different.len() - 1) as u32);
                 continue;
             }
             let innovation = if w > 0.0 { p[0][0] + 1.0 / w } else { f64::INFINITY };
             let gain = Gain {
                 state: std::array::from_fn(|i| p[i][0] / innovation),
                 innovation,
+                level: p[0],
             };
             let updated: Matrix<N> =
                 std::array::from_fn(|i| std::array::from_fn(|j| p[i][j] - gain.state[i] * p[0][j]));
@@ -107,15 +119,25 @@ impl<const N: usize> Filter<N> {
             let next: Matrix<N> = std::array::from_fn(|i| {
                 std::array::from_fn(|j| 0.5 * (moved[i][j] + moved[j][i]) + walk[i][j])
             });
-            settled = w > 0.0 && (0..N).all(|i| (next[i][i] - p[i][i]).abs() <= SETTLED * p[i][i].abs());
+            let is_settled =
+                w > 0.0 && (0..N).all(|i| (next[i][i] - p[i][i]).abs() <= SETTLED * p[i][i].abs());
+            settled = is_settled.then_some(0);
             p = next;
-            gains.push(gain);
+            different.push(gain);
+            of_sample.push((different.len() - 1) as u32);
         }
         Self {
             transition,
-            gains,
-            predicted,
+            different,
+            of_sample,
         }
+    }
+
+    /// The gain of each sample.
+    fn gains(&self) -> impl DoubleEndedIterator<Item = &Gain<N>> + ExactSizeIterator {
+        self.of_sample
+            .iter()
+            .map(|&place| &self.different[place as usize])
     }
 
     /// Innovations of the columns of `rows` over their standard deviation, zero where a sample has no part.
@@ -127,7 +149,7 @@ impl<const N: usize> Filter<N> {
         let mut state = [[0.0; COLUMNS]; N];
         state[0] = rows[0];
         let mut out = Vec::with_capacity(rows.len());
-        for (row, gain) in rows.iter().zip(&self.gains) {
+        for (row, gain) in rows.iter().zip(self.gains()) {
             let share = gain.precision().sqrt();
             let used = if share > 0.0 { 1.0 } else { 0.0 };
             let mut innovation = [0.0; COLUMNS];
@@ -154,8 +176,7 @@ impl<const N: usize> Filter<N> {
     /// Sum of the logarithms of the innovation variances over the samples that count, and their number; the first `N`, from
     /// which the state is found, do not.
     fn log_determinant(&self) -> (f64, usize) {
-        self.gains
-            .iter()
+        self.gains()
             .filter(|g| g.innovation.is_finite())
             .skip(N)
             .fold((0.0, 0), |(sum, n), g| (sum + g.innovation.ln(), n + 1))
@@ -169,17 +190,19 @@ impl<const N: usize> Filter<N> {
     pub(super) fn smoothed(&self, rows: &[Row]) -> Vec<Row> {
         let mut state = [[0.0; COLUMNS]; N];
         state[0] = rows[0];
-        let mut out = Vec::with_capacity(rows.len());
-        let mut innovations = Vec::with_capacity(rows.len());
-        let mut states = Vec::with_capacity(rows.len());
-        for (row, gain) in rows.iter().zip(&self.gains) {
+        // The filter's level at each sample, and behind the way back the course's.
+        let mut course = Vec::with_capacity(rows.len());
+        let innovation = |row: &Row, level: &Row, gain: &Gain<N>| {
             let used = if gain.innovation.is_finite() { 1.0 } else { 0.0 };
             let mut innovation = [0.0; COLUMNS];
             for c in 0..COLUMNS {
-                innovation[c] = used * (row[c] - state[0][c]);
+                innovation[c] = used * (row[c] - level[c]);
             }
-            states.push(state[0]);
-            innovations.push(innovation);
+            innovation
+        };
+        for (row, gain) in rows.iter().zip(self.gains()) {
+            course.push(state[0]);
+            let innovation = innovation(row, &state[0], gain);
             for i in 0..N {
                 for c in 0..COLUMNS {
                     state[i][c] += gain.state[i] * innovation[c];
@@ -193,8 +216,8 @@ impl<const N: usize> Filter<N> {
         }
         // r of the backward recursion: r_{k-1} = z v/F + L' r_k with L = T (1 - K z').
         let mut r = [[0.0; COLUMNS]; N];
-        for k in (0..rows.len()).rev() {
-            let (gain, p) = (&self.gains[k], &self.predicted[k]);
+        for ((row, level), gain) in rows.iter().zip(&mut course).zip(self.gains()).rev() {
+            let innovation = innovation(row, level, gain);
             let mut moved = [[0.0; COLUMNS]; N];
             for j in 0..N {
                 for i in 0..=j {
@@ -209,26 +232,23 @@ impl<const N: usize> Filter<N> {
                 for i in 0..N {
                     taken += gain.state[i] * moved[i][c];
                 }
-                moved[0][c] += precision * innovations[k][c] - taken;
+                moved[0][c] += precision * innovation[c] - taken;
             }
             r = moved;
-            let mut course = states[k];
             for i in 0..N {
                 for c in 0..COLUMNS {
-                    course[c] += p[0][i] * r[i][c];
+                    level[c] += gain.level[i] * r[i][c];
                 }
             }
-            out.push(course);
         }
-        out.reverse();
-        out
+        course
     }
 
     /// The variance of the course's error in units of the noise variance.
     pub(super) fn variances(&self) -> Vec<f64> {
         let mut big_n = [[0.0; N]; N];
-        let mut out = vec![0.0; self.gains.len()];
-        for (k, (gain, p)) in self.gains.iter().zip(&self.predicted).enumerate().rev() {
+        let mut out = vec![0.0; self.of_sample.len()];
+        for (out, gain) in out.iter_mut().zip(self.gains()).rev() {
             let mut through = self.transition;
             for row in &mut through {
                 let taken: f64 = row.iter().zip(&gain.state).map(|(t, g)| t * g).sum();
@@ -236,8 +256,8 @@ impl<const N: usize> Filter<N> {
             }
             big_n = times(&transposed(&through), &times(&big_n, &through));
             big_n[0][0] += gain.precision();
-            let along = |m: &[f64; N]| -> f64 { m.iter().zip(&p[0]).map(|(a, b)| a * b).sum() };
-            out[k] = (p[0][0] - along(&std::array::from_fn(|i| along(&big_n[i])))).max(0.0);
+            let along = |m: &[f64; N]| -> f64 { m.iter().zip(&gain.level).map(|(a, b)| a * b).sum() };
+            *out = (gain.level[0] - along(&std::array::from_fn(|i| along(&big_n[i])))).max(0.0);
         }
         out
     }
@@ -267,8 +287,7 @@ pub(super) fn likelihood<const N: usize>(
     let m = regressors;
     // The first samples find the state; what they leave over says nothing.
     let first = filter
-        .gains
-        .iter()
+        .gains()
         .enumerate()
         .filter(|(_, g)| g.innovation.is_finite())
         .nth(N)

@@ -22,20 +22,17 @@ pub(crate) struct Jump {
     pub after_s: f64,
 }
 
-/// The longest gap of rising stamps with usually `step_s` between them, if the gaps leave too many rows empty.
-pub(crate) fn jump(time_s: &[f64], step_s: f64) -> Option<Jump> {
-    let gaps = || time_s.windows(2).map(|w| w[1] - w[0]);
-    let empty: f64 = gaps().map(|gap| (gap / step_s - 1.5).max(0.0)).sum();
+/// The longest of these gaps of rising stamps with usually `step_s` between them, if the gaps leave too many rows empty.
+pub(crate) fn jump(gaps: impl Iterator<Item = Jump> + Clone, step_s: f64) -> Option<Jump> {
+    let length_s = |gap: &Jump| gap.after_s - gap.before_s;
+    let empty: f64 = gaps
+        .clone()
+        .map(|gap| (length_s(&gap) / step_s - 1.5).max(0.0))
+        .sum();
     if empty <= MOST_EMPTY_ROWS {
         return None;
     }
-    let (row, _) = gaps().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let (before_s, after_s) = (time_s[row], time_s[row + 1]);
-    Some(Jump {
-        row,
-        before_s,
-        after_s,
-    })
+    gaps.max_by(|a, b| length_s(a).total_cmp(&length_s(b)))
 }
 
 impl Jump {
@@ -75,8 +72,13 @@ pub(super) fn usable(
     stretches: &[(f64, f64)],
 ) -> Result<Range<usize>, LogError> {
     let mut rows = 0..time_s.len();
-    while let Some(jump) = jump(&time_s[rows.clone()], step_s) {
-        let next = rows.start + jump.row + 1;
+    let gap = |row| Jump {
+        row,
+        before_s: time_s[row],
+        after_s: time_s[row + 1],
+    };
+    while let Some(jump) = jump((rows.start..rows.end.max(1) - 1).map(gap), step_s) {
+        let next = jump.row + 1;
         if jump.use_after(&lines.place(next), 0.0, stretches)? {
             rows.start = next;
         } else {

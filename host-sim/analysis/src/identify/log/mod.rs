@@ -84,6 +84,11 @@ pub struct DriveLog {
     pub findings: Vec<[String; 3]>,
 }
 
+/// Rows beyond which a fit gains nothing that a driver's remnant of half a hertz would let it: 42 min at 120 Hz.
+const MOST_ROWS: usize = 300_000;
+/// Rows a second that are left of more: two in the muscle's lag of 0.1 s.
+const LEAST_RATE_HZ: f64 = 20.0;
+
 /// The column of a time series that tells the speed; a log may lack it.
 pub const SPEED_COLUMN: &str = "speed_m_per_s";
 /// The largest speed over the least that passes for one speed.
@@ -210,6 +215,42 @@ impl DriveLog {
             ..bus_trace::Recording::default()
         };
         Ok(of_csv(source, &[], &how)?.0)
+    }
+
+    /// Every so many-th row, where there are more than a fit gains from: the least that leaves [`MOST_ROWS`], but not so many
+    /// that fewer than [`LEAST_RATE_HZ`] would remain.
+    pub(crate) fn thinned(mut self) -> Self {
+        let rate_hz = 1.0 / self.dt_s;
+        let every = self
+            .len()
+            .div_ceil(MOST_ROWS)
+            .min((rate_hz / LEAST_RATE_HZ) as usize);
+        if every < 2 {
+            return self;
+        }
+        self.findings.push([
+            "rows".to_owned(),
+            format!("{} at {rate_hz:.0} Hz", self.len()),
+            format!("one of {every} used"),
+        ]);
+        for signal in [
+            &mut self.e_y_m,
+            &mut self.e_theta_rad,
+            &mut self.wheel_angle_rad,
+            &mut self.guidance_torque_nm,
+            &mut self.driver_torque_nm,
+        ] {
+            *signal = signal.iter().copied().step_by(every).collect();
+        }
+        self.dt_s *= every as f64;
+        self.resampling = self
+            .resampling
+            .iter()
+            .copied()
+            .skip(every - 1)
+            .step_by(every)
+            .collect();
+        self
     }
 
     /// Keeps what the record says of the speed.

@@ -330,3 +330,46 @@ fn a_log_that_was_written_is_read_again() {
     assert_eq!(again.driver_torque_nm, log.driver_torque_nm);
     assert!((again.dt_s - 0.01).abs() < 1e-9);
 }
+
+/// Row k is k: what is left says which rows were taken. The limit of the rate counts where rows are many and slow.
+#[test]
+fn of_more_rows_than_a_fit_gains_from_every_so_many_th_is_used() {
+    let log = |rows: usize, rate_hz: f64| {
+        let signal: Vec<f64> = (0..rows).map(|k| k as f64).collect();
+        let log = DriveLog {
+            start_s: 5.0,
+            dt_s: 1.0 / rate_hz,
+            e_y_m: signal.clone(),
+            e_theta_rad: signal.clone(),
+            wheel_angle_rad: signal.clone(),
+            guidance_torque_nm: signal.clone(),
+            driver_torque_nm: signal,
+            resampling: vec![0.6, 0.5, 0.4, 0.3],
+            ..DriveLog::default()
+        };
+        log.thinned()
+    };
+    for (rows, rate_hz, every) in [
+        (300_000, 120.0, 1),
+        (300_001, 120.0, 2),
+        (600_000, 120.0, 2),
+        (600_001, 120.0, 3),
+        (900_000, 40.0, 2),
+        (900_000, 39.0, 1),
+    ] {
+        let thin = log(rows, rate_hz);
+        assert_eq!(thin.len(), rows.div_ceil(every), "{rows} {rate_hz}");
+        for signal in thin.signals() {
+            assert_eq!(signal[..3], [0.0, every as f64, 2.0 * every as f64]);
+        }
+        assert_eq!(thin.start_s, 5.0);
+        assert!((thin.dt_s * rate_hz - every as f64).abs() < 1e-12);
+        assert_eq!(thin.findings.len(), usize::from(every > 1));
+    }
+    assert_eq!(log(600_000, 120.0).resampling, [0.5, 0.3]);
+    let found = log(600_000, 120.0).findings;
+    assert_eq!(
+        found,
+        [["rows", "600000 at 120 Hz", "one of 2 used"].map(String::from)]
+    );
+}

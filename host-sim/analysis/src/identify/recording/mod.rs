@@ -54,14 +54,19 @@ pub fn open(
     let opened = std::fs::File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
     opened.map_err(|e| LogError::in_file(path.display(), e))?;
     if let Some(format) = bus_format(format, &head).filter(|_| layout.is_none()) {
-        let log = BusLog::of_file(path, format).map_err(LogError::from);
+        let watch = how.watch.cloned().unwrap_or_default();
+        let log = BusLog::of_file(path, format)
+            .map(|log| log.watched(watch))
+            .map_err(LogError::from);
         let read = log.and_then(|log| once(maps).and_then(|()| of_bus(log, maps, how)));
         return read.map_err(named);
     }
     if layout.is_none() && matches!(format, None | Some(Format::Csv | Format::Candump)) {
         // As it comes: a table of many hours fills a memory.
         let file = std::fs::File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
-        return once(maps).and_then(|()| of_csv(file, maps, how)).map_err(named);
+        let watch = how.watch.cloned().unwrap_or_default();
+        let read = once(maps).and_then(|()| of_csv(watch.over(file), maps, how));
+        return read.map_err(named);
     }
     let bytes = std::fs::read(path).map_err(|e| LogError::in_file(path.display(), e))?;
     of_bytes(bytes, format, layout, maps, how).map_err(named)
@@ -223,6 +228,16 @@ fn of_channels(
         let map = maps.iter().find(|map| map.column == i);
         let (group, series) = match recording.find(map.map_or(NAMES[i], |map| &map.term.channel)) {
             Ok(found) => found,
+            // It is there, but not once.
+            Err(error)
+                if recording
+                    .groups
+                    .iter()
+                    .flat_map(|group| &group.channels)
+                    .any(|own| own.name == NAMES[i]) =>
+            {
+                return Err(error.into());
+            }
             Err(_) if manual && i == GUIDANCE && map.is_none() => continue,
             Err(_) if map.is_none() => {
                 missing.push(NAMES[i]);
@@ -260,7 +275,7 @@ fn of_channels(
         log.tell_speed(&ends);
         notes.extend(fast(&log));
     }
-    Ok((log, notes))
+    Ok((log.thinned(), notes))
 }
 
 /// Which columns a recording lacks, with what is like them.
