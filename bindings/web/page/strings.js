@@ -50,7 +50,7 @@ const STRINGS = { en: {
   said_reliance: "With K_hg {k_hg} the {who} driver leaves the middle by up to {now} m, without guidance by {alone} m, and turns with {effort} N.m on average instead of {alone_effort}.",
   why_relies: "All of the guidance reaches the wheel, {guidance} N.m on average, and the guidance is not late.",
   why_between: "Why: of the guidance's {guidance} N.m on average the hands hold against {percent} %, so {through} N.m reach the wheel. What is missing has to come from a driver who acts {t_p} s late.",
-  why_resists: "Why: the hands cancel the guidance's {guidance} N.m, so the car is steered by eyes alone, {t_p} s late, nearly as without guidance; and the hands work against it besides.",
+  why_resists: "Why: the hands cancel the guidance's {guidance} N.m, so both together turn the wheel as the driver's eyes alone would, {t_p} s late: nearly as without guidance. It costs no strength: the driver's torque is less by what the guidance adds.",
   failure_high: "Who relied swings out furthest.", failure_mid: "Who went half along swings out furthest.", failure_low: "Who resisted swings out furthest.", failure_alike: "At this instant it is the same for all three.",
   said_failure: "Torque lost at {at} s, driver {t_p} s late: who relies swings out to {high} m, who goes half along to {mid} m, who resists to {low} m. Without a failure it was {none} m for who relies.",
   said_handover: "The failure at {at} s takes the car {sudden} m off the middle if the torque is gone at once, {handed} m with a handover, and {none} m is the most if nothing fails.",
