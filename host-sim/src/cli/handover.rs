@@ -1,8 +1,7 @@
 //! `host-sim handover`.
 
 use clap::Args;
-use haptic_batch::engine::Study;
-use haptic_batch::handover::{EVERY_S, Handover, HandoverRow};
+use haptic_batch::handover::{EVERY_S, HandoverRow, study};
 use haptic_report::studies::handover::report;
 
 use super::progress::Threads;
@@ -31,8 +30,9 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("handover")?;
-    let study = Handover::new(arguments.every)?;
-    let results = progress::watched("drives", |watch| arguments.threads.run(|| study.run(watch)))??;
+    let results = progress::watched("drives", |watch| {
+        arguments.threads.run(|| study(arguments.every, watch))
+    })??;
     let holds = !results.rows.iter().any(HandoverRow::is_broken);
     output.show(&report(&results), &results, holds)
 }
