@@ -246,7 +246,7 @@ async function addresses() {
   let seed = 1;
   const uniform = () => { seed = (1664525 * seed + 1013904223) % 4294967296; return seed / 4294967296; };
   const one = list => list[Math.floor(uniform() * list.length)], between = (low, high) => low + (high - low) * uniform();
-  // Ends as docs/files.md has them for a scenario; a participant of table 6 has t_p 0.01 s.
+  // Ends as examples/every-field.toml has them for a scenario; a participant of table 6 has t_p 0.01 s.
   const drive = () => ({ driver: one(["own", "1", "9", "17"]), a_1: between(0, 10), a_2: between(0, 10), a_3: between(0, 100), t_p: one([0.001, 0.01, between(0.001, 2), 2]),
     k_hg: one([0, between(0, 10), 10]), k_d: between(0, 50), speed: between(20, 250), guided: one([true, false]), k_1: one([0, between(0, 4), 4]),
     law: one(["shipping", "own", "band"]), fail: one(["none", "torque", "input"]), at: between(0, 1e6), probe: one([true, false]), remnant: between(0, 5),

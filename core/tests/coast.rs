@@ -227,6 +227,32 @@ fn a_new_line_that_moves_as_the_vehicle_does_is_trusted() {
     }
 }
 
+/// A new line runs off at 0.03 rad, 0.5 m/s at the near point from 0.4 s later on, and its picture moves by a share of that. A
+/// line of which a quarter of the movement is missing, or comes on top, is trusted as soon as 0.2 m were predicted; beyond that it
+/// stays doubted, with half of the torque.
+#[test]
+fn a_new_line_is_trusted_where_a_quarter_of_its_movement_is_missing() {
+    for sign in [1.0, -1.0] {
+        for (share, trust) in [(0.65, 0.5), (0.85, 1.0), (1.15, 1.0), (1.35, 0.5)] {
+            let mut rig = on_a_new_line(sign);
+            let mut e_y = 0.5;
+            rig.lane.e_theta = Radians::from_rad(-0.03 * sign);
+            for ms in 0..1700 {
+                if ms >= 400 {
+                    e_y -= 1e-3 * share * 0.03 * SPEED;
+                }
+                rig.lane.e_y = Metres::from_m(sign * e_y);
+                let command = rig.tick().command;
+                assert_eq!(command.mode, Mode::Active, "{share} {ms} {:?}", command.faults);
+            }
+            // The gains of the lateral error, of its rate and of the yaw error.
+            let asked = PER_M * e_y - 0.0125 * share * 0.03 * SPEED - 10.0 * 0.03;
+            let given = sign * rig.applied / asked;
+            assert!((given - trust).abs() < 0.05, "{share}: {given}, not {trust}");
+        }
+    }
+}
+
 /// Both errors mirrored: what is seen and what is predicted come to differ by 2*(0.4 + 0.3) s times 0.47 m/s, 0.65 m.
 #[test]
 fn a_new_line_that_is_mirrored_is_found() {

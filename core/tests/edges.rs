@@ -1,4 +1,4 @@
-//! Edges that thirteen defects made by hand went over unseen: a constant by one, a guard dropped, a word left out. Each
+//! Edges that defects made by hand went over unseen: a constant by one, a guard dropped, a word left out. Each
 //! test names the defect that it is for; `cargo xtask mutants --by-hand` puts them in, one by one (`mutants.toml`), and
 //! fails if none of the tests does.
 
@@ -6,15 +6,17 @@ use crate::rig::Rig;
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{Column, Guidance, Identity, Message, Telemetry};
-use haptic_core::controller::config::Setup;
-use haptic_core::controller::inputs::Motion;
+use haptic_core::controller::config::{Config, Setup};
+use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
+use haptic_core::controller::{Controller, ControllerState};
 use haptic_core::ecu::Step;
 use haptic_core::ecu::injection::Region;
 use haptic_core::estimator::{Reading, Sample};
+use haptic_core::lane::LaneSample;
 use haptic_core::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_core::safety::actuator::{Actuator, Motor};
 use haptic_core::safety::envelope::LimitReason;
-use haptic_core::safety::faults::Fault;
+use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
@@ -504,5 +506,58 @@ fn steps_out_of_time_are_counted_in_a_row() {
         }
         let step = rig.tick_after(us);
         assert!(step.command.faults.contains(Fault::Deadline), "{us} us");
+    }
+}
+
+/// A picture that is up to 10 ms old when it arrives goes on at its own rates; an older one is corrected by how the vehicle has
+/// turned since. On a straight the yaw rate steps to 0.05 rad/s: of (9) that is 0.25*(0.05*0.3*16.7*0.05 + 1*0.05) = 0.0156 N.m,
+/// and 0.0005 N.m more in each millisecond.
+#[test]
+fn a_picture_is_late_beyond_10_ms() {
+    const SPEED: f64 = 50.0 / 3.0;
+    for sign in [1.0, -1.0] {
+        for (age_us, is_late) in [(9_999, false), (10_000, false), (10_001, true), (20_000, true)] {
+            let controller = Controller::new(Config::PAPER);
+            let start = Instant::from_us(1_000_000);
+            let mut state = ControllerState::engaged(start);
+            let (mut applied, mut motion, mut lane) = (Torque::ZERO, None, None);
+            for ms in 1..=198_u32 {
+                let now = start.after(Micros::from_ms(ms));
+                let [moves, shows] = [ms % 10 == 0 || ms == 1, ms < 190 && (ms % 10 == 5 || ms == 1)];
+                // The step comes with a message, 5 ms after the last picture.
+                let rate = if ms >= 190 { 0.05 * sign } else { 0.0 };
+                if moves {
+                    let rate = TurningRate::from_rad_per_s(rate);
+                    motion = Some(Motion::new([Speed::from_m_per_s(SPEED); 2], Some(rate)));
+                }
+                if shows {
+                    lane = Some(LaneSample {
+                        at: now.before(Micros::from_us(age_us)),
+                        ..LaneSample::default()
+                    });
+                }
+                // A hand is never still to the bit.
+                let column = ColumnState {
+                    driver_torque: Torque::from_nm(1e-3 * f64::from(ms % 7)),
+                    wheel_angle: Radians::ZERO,
+                };
+                let inputs = Inputs {
+                    lane: lane.map_or(Input::Lost, if shows { Input::New } else { Input::Held }),
+                    column: Input::New(column),
+                    motion: motion.map_or(Input::Lost, if moves { Input::New } else { Input::Held }),
+                    request: Input::New(Request {
+                        engage: true,
+                        authority: Ratio::ONE,
+                        probe: false,
+                    }),
+                    faults: FaultSet::NONE,
+                };
+                let command = controller.step(&mut state, now, applied, &inputs);
+                applied = command.torque;
+            }
+            let torque = sign * applied.nm();
+            let expected = if is_late { -0.0156 - 8.0 * 0.0005 } else { 0.0 };
+            assert!((torque - expected).abs() < 0.002, "{age_us}: {torque}");
+        }
     }
 }

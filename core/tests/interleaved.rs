@@ -280,6 +280,28 @@ fn a_sender_that_repeats_itself_or_swaps_is_no_second_one() {
     }
 }
 
+/// A frame that was overtaken comes late once. Whoever sends it again contradicts the true sender, and the sixteenth time there are
+/// two: what comes next is a sender's first frame.
+#[test]
+fn an_overtaken_frame_comes_late_once() {
+    for (times, next) in [(1, Ok(())), (16, Ok(())), (17, Err(Reject::NotTrusted))] {
+        let mut rig = Rig::active_in_curve(0.5);
+        while !rig.ticks.is_multiple_of(PERIOD_MS[LANE]) {
+            rig.tick();
+        }
+        let [overtaken, first, second] = [0; 3].map(|_| rig.frame(LANE));
+        assert_eq!(rig.send(&first), Ok(()));
+        for time in 0..times {
+            assert_eq!(rig.send(&overtaken), Err(Reject::Jump), "{time}");
+        }
+        rig.silent[LANE] = true;
+        for _ in 0..PERIOD_MS[LANE] {
+            tick_uncounted(&mut rig, LANE);
+        }
+        assert_eq!(rig.send(&second), next, "{times}");
+    }
+}
+
 /// Another content under the true sender's next counter, with the CRC that its frame will have: no repetition. Request has 54
 /// bits that say nothing.
 #[test]

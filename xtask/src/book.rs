@@ -10,7 +10,8 @@ use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::tool::{self, Built, command, output, root, run};
+use crate::built::Built;
+use crate::tool::{self, command, output, root, run};
 use crate::trace;
 
 const MDBOOK: &str = "mdbook";

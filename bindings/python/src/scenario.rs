@@ -15,7 +15,7 @@ use crate::errors;
 
 /// Everything that decides a run, checked.
 ///
-/// The keywords are the fields of a scenario file (docs/files.md lists names, units, ranges and defaults); what is not
+/// The keywords are the fields of a scenario file (examples/every-field.toml lists names, units, ranges and defaults); what is not
 /// given keeps its default, so ``Scenario()`` is the paper's driver 1 with medium reliance at 60 km/h.
 ///
 /// Parameters

@@ -1,7 +1,7 @@
 // What a reader takes along: the state in the address, pictures, series, a scenario file.
 
 // What a text of an address may be, and the value that it means; `undefined` if it is none of these. The ends of numbers are those of the
-// scenario's fields (docs/files.md): a slider offers less, and a driver of the paper lies beyond some.
+// scenario's fields (examples/every-field.toml): a slider offers less, and a driver of the paper lies beyond some.
 const within = (least, most) => text => text.trim() !== "" && Number(text) >= least && Number(text) <= most ? Number(text) : undefined;
 const oneOf = (...values) => text => values.find(value => String(value) === text);
 const anyText = text => text;

@@ -28,7 +28,7 @@ impl Away {
         "unguided_s",
     ];
 
-    /// Of a run.
+    /// What a run has of it.
     pub fn new(scenario: &Scenario, trace: &Trace) -> Self {
         if scenario.condition() == Condition::Manual {
             return Self::default();

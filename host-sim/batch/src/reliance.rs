@@ -94,7 +94,7 @@ pub struct Settling {
     pub count: usize,
     /// Share of estimates within [`NEAR`] of the new truth after [`SETTLING_S`].
     pub near: f64,
-    /// The same, of changes by more than 0.3.
+    /// Share of estimates within [`NEAR`] after changes by more than 0.3.
     pub near_after_large: f64,
     /// Root of the mean squared error then.
     pub rms: f64,

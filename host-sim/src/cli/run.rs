@@ -14,7 +14,7 @@ use super::{BadInput, Outcome, print_notes};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Scenario file (TOML); every field has a default (docs/files.md lists them, examples/ has some)
+    /// Scenario file (TOML); every field has a default (examples/every-field.toml lists them)
     #[arg(value_name = "SCENARIO.toml")]
     scenario: PathBuf,
     #[command(flatten)]

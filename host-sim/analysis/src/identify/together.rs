@@ -24,7 +24,7 @@ pub fn identify_together(logs: &[DriveLog], options: &Options) -> Result<Identif
     Ok(fitted(logs, options)?.1)
 }
 
-/// The same, and the driver followed through all drives.
+/// Identifies the driver of several logs, and follows that driver through all drives.
 ///
 /// # Errors
 /// As [`identify_together`].

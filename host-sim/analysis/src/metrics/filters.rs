@@ -113,7 +113,8 @@ mod tests {
         }
     }
 
-    /// The same signal; `b, a = scipy.signal.iirnotch(2.5, 2.5 / 0.5, fs=120)`, every third value.
+    /// The notch filters the signal of the low-pass; `b, a = scipy.signal.iirnotch(2.5, 2.5 / 0.5, fs=120)`, every
+    /// third value.
     #[test]
     fn the_notch_agrees_with_scipy() {
         let y = zero_phase_notch(&signal(), 120.0, 2.5, 0.5).unwrap();

@@ -239,8 +239,8 @@ struct Recovery {
     time_to_recover_s: Option<f64>,
 }
 
-/// Of the samples up to the end of the window. What happens between a failure and a window that begins later
-/// counts: it is what the driver has to recover from.
+/// The recovery in the samples up to the end of the window. What happens between a failure and a window that begins
+/// later counts: it is what the driver has to recover from.
 fn recovery(samples: &[Sample], failure: &Failure) -> Recovery {
     let start = samples.partition_point(|s| s.time_s < failure.time_s);
     let after = &samples[start..];

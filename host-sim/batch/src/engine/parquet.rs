@@ -33,7 +33,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// With its columns, empty, and with what the file's metadata say.
+    /// A table with its columns, empty, and with what the file's metadata say.
     pub(super) fn create(
         columns: impl IntoIterator<Item = (String, EntryKind)>,
         metadata: &[(&str, &str)],

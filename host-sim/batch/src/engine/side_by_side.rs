@@ -26,7 +26,7 @@ pub(crate) struct Checked {
 }
 
 impl Checked {
-    /// Of a study of so many runs, drawn by its seed.
+    /// Which runs of a study of so many are checked, drawn by its seed.
     pub(crate) fn new(seed: u64, of: u64) -> Self {
         Self {
             seed: Stream::Design.seed(seed),
@@ -76,7 +76,7 @@ impl Group<'_> {
         )
     }
 
-    /// The same by whatever drives side by side.
+    /// Drives the runs by whatever drives side by side.
     fn with(
         &self,
         drive: impl FnOnce(&mut dyn FnMut(usize, Event)),

@@ -21,11 +21,11 @@ pub enum Kind {
     KHgDrifts(f64),
     /// K_d steps to 1.5 times its value, or to the 1.5th part.
     KDSteps,
-    /// The same over 60 s.
+    /// K_d drifts to 1.5 times its value, or to the 1.5th part, over 60 s.
     KDDrifts,
     /// t_p steps from 0.1 to 0.3 s.
     TPSteps,
-    /// The same over 60 s.
+    /// t_p drifts from 0.1 to 0.3 s over 60 s.
     TPDrifts,
     /// K_hg steps to and fro by 0.5, ten times.
     TenSteps,

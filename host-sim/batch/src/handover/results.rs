@@ -25,7 +25,7 @@ pub struct Place {
     pub t_p: f64,
     /// The instant of the failure, s after the bend begins.
     pub instant_s: f64,
-    /// The same in words.
+    /// The instant in words.
     pub place: String,
 }
 

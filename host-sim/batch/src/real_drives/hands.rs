@@ -129,7 +129,7 @@ pub struct Threshold {
 }
 
 impl Hands {
-    /// Of all recordings; none of none.
+    /// Judges all recordings; none if there is none.
     pub(super) fn new(found: &[&(Felt, Vec<Fed>)]) -> Option<Self> {
         let felt: Vec<&Felt> = found.iter().map(|(felt, _)| felt).collect();
         let (seconds, shares) = shares(&felt)?;

@@ -20,10 +20,10 @@ pub(super) struct Rows {
     /// Zero by hand.
     pub(super) guidance_nm: Vec<f64>,
     pub(super) wheel_rad: Vec<f64>,
-    /// Of a lane that is the way which the vehicle goes.
+    /// Lane errors of a lane that is the way which the vehicle goes.
     pub(super) e_y_m: Vec<f64>,
     pub(super) e_theta_rad: Vec<f64>,
-    /// As measured; where it is not, by curvature and speed.
+    /// Measured, or, where it is not, of curvature and speed.
     pub(super) yaw_rate_rad_per_s: Vec<f64>,
 }
 

@@ -11,7 +11,7 @@ pub enum Order {
     BalancedLatinSquare,
     /// Each condition as often in each place.
     LatinSquare,
-    /// As they are listed, for everybody.
+    /// The order in which they are listed, for everybody.
     Listed,
 }
 

@@ -22,7 +22,7 @@ pub struct Chunk {
 }
 
 impl Chunk {
-    /// As bytes that [`Chunk::from_bytes`] reads.
+    /// The bytes that [`Chunk::from_bytes`] reads.
     pub fn to_bytes(&self, fingerprint: u64) -> Vec<u8> {
         let columns = OWN + self.rows.first().map_or(0, |row| row.metrics.len());
         let mut bytes = FORM.to_vec();

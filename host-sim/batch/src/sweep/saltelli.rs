@@ -31,7 +31,7 @@ pub(super) struct Blocks {
 #[derive(Debug, Clone, Default)]
 struct Sums {
     count: f64,
-    /// Of the first and the second sample: the values and their squares.
+    /// Sums of the first and the second sample: the values and their squares.
     own: [f64; 2],
     squares: f64,
     /// By field: mixture less first sample, that times the second, and its square.

@@ -104,12 +104,12 @@ impl Block {
         }
     }
 
-    /// The same, which a terminal leaves out.
+    /// The block for a page, which a terminal leaves out.
     pub fn on_page(self) -> Self {
         Self::OnPage(Box::new(self))
     }
 
-    /// The same, which a page leaves out.
+    /// The block for a terminal, which a page leaves out.
     pub fn on_terminal(self) -> Self {
         Self::OnTerminal(Box::new(self))
     }

@@ -17,7 +17,7 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Of a result that follows from a scenario, if there is one.
+    /// The provenance of a result that follows from a scenario, if there is one.
     pub fn new(scenario: Option<String>) -> Self {
         Self {
             program: "host-sim",
@@ -36,7 +36,7 @@ impl Provenance {
     }
 }
 
-/// Of a result that no scenario decides.
+/// The provenance of a result that no scenario decides.
 impl Default for Provenance {
     fn default() -> Self {
         Self::new(None)

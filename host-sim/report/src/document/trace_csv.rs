@@ -11,9 +11,9 @@ use std::path::Path;
 pub enum SeriesFormat {
     /// Not at all.
     None,
-    /// As CSV, 200 bytes a sample.
+    /// Plain CSV, 200 bytes a sample.
     Csv,
-    /// As CSV compressed with gzip, a fifth of it; pandas, R and MATLAB read it as it is.
+    /// CSV compressed with gzip, a fifth of it; pandas, R and MATLAB read it as it is.
     CsvGz,
 }
 

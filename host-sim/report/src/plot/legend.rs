@@ -18,7 +18,7 @@ const GAP: f64 = 8.0;
 
 /// What an entry explains.
 enum What<'a> {
-    /// With the frame of its panel.
+    /// A series, with the frame of its panel.
     Series(&'a Series, &'a Frame<'a>),
     Marker,
     Band {

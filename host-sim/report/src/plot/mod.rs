@@ -76,7 +76,7 @@ impl Axis {
         }
     }
 
-    /// The same from one end to the other.
+    /// The axis from one end to the other.
     #[must_use]
     pub fn within(self, low: f64, high: f64) -> Self {
         Self {
@@ -85,7 +85,7 @@ impl Axis {
         }
     }
 
-    /// The same around these places, which are the middles of fields of a map.
+    /// The axis around these places, which are the middles of fields of a map.
     pub fn around(self, places: &[f64]) -> Self {
         let half = 0.5 * (places[1] - places[0]);
         self.within(places[0] - half, places[places.len() - 1] + half)
@@ -155,7 +155,7 @@ pub enum Mark {
     Fields {
         /// Width and height.
         size: [f64; 2],
-        /// Of each how strong its colour is, from 0 to 1, and what is written in it.
+        /// How strong the colour of each is, from 0 to 1, and what is written in it.
         shown: Vec<(f64, String)>,
     },
 }
@@ -210,7 +210,7 @@ impl Series {
         }
     }
 
-    /// The same with its points joined by a line, which breaks where a value is not finite.
+    /// The series with its points joined by a line, which breaks where a value is not finite.
     #[must_use]
     pub fn joined(self) -> Self {
         Self { joined: true, ..self }
@@ -309,7 +309,7 @@ pub struct PlotError(String);
 
 /// Room left between a series and the frame, as a share of the extent of the values.
 const MARGIN: f64 = 0.05;
-/// The same behind a line that ends before its time.
+/// Room left behind a line that ends before its time, as a share of the extent.
 const ROOM_BEHIND: f64 = 0.02;
 
 impl Figure {

@@ -20,7 +20,7 @@ pub struct Balance {
     /// Without a fault.
     #[serde(flatten)]
     pub availability: Availability,
-    /// With every fault by name.
+    /// The results with every fault by name.
     pub detection: Option<Detection>,
 }
 
@@ -160,7 +160,7 @@ fn table(results: &Availability) -> Table {
     Table::of_rows("", results.cells.iter().chain(&results.together).map(row))
 }
 
-/// The same by the faults that the ECU named.
+/// False declarations by the faults that the ECU named.
 fn causes(results: &Availability) -> Table {
     let rows = results.cells.iter().flat_map(|row| {
         row.causes.iter().map(|cause| {

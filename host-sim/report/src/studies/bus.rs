@@ -14,14 +14,14 @@ pub struct Load {
     pub bit_rate: f64,
     /// Every message, most urgent first.
     pub messages: Vec<MessageLoad>,
-    /// Of all messages, as a share.
+    /// Load of all messages, from 0 to 1.
     pub load: f64,
     /// Most that it may be.
     pub max_load: f64,
 }
 
 impl Load {
-    /// Of these messages.
+    /// The load that these messages make.
     pub fn new(messages: Vec<MessageLoad>) -> Self {
         Self {
             bit_rate: BIT_RATE,

@@ -4,7 +4,7 @@
 //! `t_p_s`, `k_d_nm_per_rad`, `remnant_sd_nm`. What has no unit has none in its name ([`suffix`]).
 //!
 //! `fields!` makes the struct of a table from its list. Reading and writing TOML, the checks, the units of a sweep, the
-//! variables of an FMU, the stub for Python and the tables of `docs/files.md` follow from it.
+//! variables of an FMU, the stub for Python and `examples/every-field.toml` follow from it.
 
 mod in_file;
 

@@ -1,5 +1,5 @@
 //! The form of a scenario in a TOML file: tables `driver`, `vehicle`, `guidance`, `failure` and
-//! `driver_change`, every field with a default, an unknown one an error. docs/files.md lists them all. Ranges
+//! `driver_change`, every field with a default, an unknown one an error. examples/every-field.toml lists them. Ranges
 //! are checked by the scenario itself.
 
 use serde::{Deserialize, Serialize};

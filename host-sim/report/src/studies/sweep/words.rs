@@ -24,7 +24,7 @@ pub(super) fn metric(metric: &str) -> (String, &'static str) {
     (label(metric), if unit == "1" { "-" } else { unit })
 }
 
-/// As it stands behind other words: abbreviations keep their capitals.
+/// A label that stands behind other words: abbreviations keep their capitals.
 pub(super) fn lower(name: &str) -> String {
     let mut letters = name.chars();
     match (letters.next(), letters.clone().next()) {
