@@ -37,7 +37,7 @@ pub enum Method {
     /// Prediction errors with a disturbance model.
     #[default]
     NoiseModel,
-    /// As published.
+    /// The published method.
     Paper,
 }
 
@@ -127,9 +127,9 @@ pub fn identify_several(
 pub struct Drivers {
     /// Name of the drive and what was made of it.
     pub drivers: Vec<(String, Identification)>,
-    /// Of two drivers, the first less the second; empty otherwise.
+    /// The first of two drivers less the second; empty otherwise.
     pub differences: Vec<Difference>,
-    /// Of three drivers or more, what the group is like; empty otherwise.
+    /// What a group of three drivers or more is like; empty otherwise.
     pub population: Vec<Population>,
 }
 

@@ -118,7 +118,7 @@ pub struct Pair {
     pub law_slope: f64,
     /// The largest slope of the driver's map at gains that the law's map has, 1/(N.m); none where the driver has two equilibria there.
     pub driver_slope: Option<f64>,
-    /// Of both.
+    /// The product of both slopes.
     pub product: Option<f64>,
     /// K_hg before the loss, and settled behind it.
     pub k_hg: [Option<Mean>; 2],

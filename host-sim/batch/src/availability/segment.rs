@@ -53,7 +53,7 @@ pub struct DriveSegment {
     pub ended: Ended,
     /// What took guidance away.
     pub declarations: Vec<Declaration>,
-    /// The same drive without guidance.
+    /// The drive again, without guidance.
     pub by_hand: ByHand,
 }
 
@@ -73,7 +73,7 @@ pub struct ByHand {
 pub enum Ended {
     /// At its end.
     Whole,
-    /// With a fault that only a new power-up ends.
+    /// It ended with a fault that only a new power-up ends.
     Latched,
     /// Off the road.
     Diverged,

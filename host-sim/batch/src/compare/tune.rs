@@ -1,4 +1,4 @@
-//! The same budget for every law: its untuned set, and points of Sobol's sequence in the box of what tuning may vary. The set with the
+//! Every law has one budget: its untuned set, and points of Sobol's sequence in the box of what tuning may vary. The set with the
 //! least objective is judged; the objective is a weighted sum of metrics, averaged over the training drives.
 
 use super::{Compare, Driven, Faults, METRICS, StudyError, Watch};

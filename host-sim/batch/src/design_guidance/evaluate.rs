@@ -177,7 +177,7 @@ fn noise_nm(run: &Run) -> f64 {
     rms(fast).unwrap_or(0.0)
 }
 
-/// Of drives, each followed by its losses: the mean, a drive's loss being its worst.
+/// The mean of drives, each followed by its losses; a drive's loss is its worst.
 fn mean(runs: &[Figures], losses: usize) -> Figures {
     let drives = runs.chunks(1 + losses);
     let count = drives.len() as f64;

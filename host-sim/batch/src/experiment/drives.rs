@@ -41,7 +41,7 @@ pub(super) fn driven(
     driven_by(plan, number, truth, truth.parameters())
 }
 
-/// The same, by a driver who differs from the published one in what the log does not name.
+/// Lets a driver drive who differs from the published one in what the log does not name.
 pub(super) fn driven_by(
     plan: &ExperimentPlan,
     number: u32,

@@ -60,7 +60,7 @@ pub enum Subject {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
-    /// Of this program.
+    /// This program.
     Simulated,
     /// A file that was brought in.
     Imported,
@@ -96,7 +96,7 @@ pub struct SessionResult {
     pub repetition: usize,
     /// Who drives.
     pub who: Subject,
-    /// Of all random numbers.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// What was recorded; nothing if it is missing.
     pub recorded: Option<Recorded>,
@@ -173,7 +173,7 @@ impl Study {
         self.import_table(out, what, (file, &csv?))
     }
 
-    /// The same of a table of another file, as CSV.
+    /// Keeps a person's recording that was read from another file, as CSV.
     ///
     /// # Errors
     /// As [`Study::import`].

@@ -51,12 +51,12 @@ pub struct Effect {
 pub struct Level {
     /// The value, or the mean of the slice.
     pub label: String,
-    /// The same as a number, if it is one.
+    /// The value as a number, if it is one.
     pub x: Option<f64>,
     /// What came of its drives.
     #[serde(flatten)]
     pub drives: Drives,
-    /// The same for each value of the field that the sweep compares; of that field itself none.
+    /// What came of the drives with each value of the field that the sweep compares; nothing for that field itself.
     pub compared: Vec<Compared>,
 }
 
@@ -259,7 +259,7 @@ impl Sums {
 }
 
 impl Axis {
-    /// As [`Effect::best`] says.
+    /// The levels that [`Effect::best`] names.
     fn best(&self, has_limit: bool, level: Confidence, small_is_bad: bool) -> Vec<String> {
         let driven: Vec<usize> = (0..self.levels.len())
             .filter(|i| self.levels[*i].all.drives > 0)

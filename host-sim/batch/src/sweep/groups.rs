@@ -11,7 +11,7 @@ pub struct Drives {
     /// How many.
     #[serde(rename = "drives")]
     pub count: u64,
-    /// Those that diverged: their metrics, if they have any, end there.
+    /// Drives that diverged: their metrics, if they have any, end there.
     pub diverged: u64,
     /// Mean of the metric that judges.
     pub mean: Option<f64>,
@@ -38,11 +38,11 @@ pub(super) struct Group {
     pub(super) diverged: u64,
     pub(super) beyond: u64,
     pub(super) judged: Moments,
-    /// Of the sample under way, by repeat: drives, and the metric that judges.
+    /// The sample under way, by repeat: drives, and the metric that judges.
     pub(super) now: Vec<(u64, Moments)>,
     /// The means of the samples before.
     pub(super) observed: Moments,
-    /// Those samples, with a mean or without.
+    /// Samples before, with a mean or without.
     observations: u64,
 }
 

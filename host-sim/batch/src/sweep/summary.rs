@@ -32,7 +32,7 @@ pub struct Summary {
     pub diverged: u64,
     /// Drives in which the ECU ended guidance by itself.
     pub left_by_itself: u64,
-    /// The same by why.
+    /// Those drives by why the ECU ended guidance.
     pub left_why: BTreeMap<String, u64>,
     /// The metric by which drives are called bad.
     pub judge: &'static str,
@@ -45,11 +45,11 @@ pub struct Summary {
     pub beyond: Option<u64>,
     /// The field whose values are told apart, if the sweep compares.
     pub compare: Option<String>,
-    /// Of each metric.
+    /// How each metric is spread.
     pub distributions: Vec<Distribution>,
-    /// Of each axis.
+    /// What each axis does.
     pub effects: Vec<Effect>,
-    /// Of each sampled field and metric, if the design allows.
+    /// Sobol indices of each sampled field and metric, if the design allows.
     pub sobol: Vec<SobolIndex>,
     /// The worst drives, the worst first.
     pub worst: Vec<Worst>,
@@ -301,7 +301,7 @@ impl Spread {
 mod tests {
     use super::*;
 
-    /// Of the numbers 1 to 1000 every figure is known by hand.
+    /// Every figure of the numbers 1 to 1000 is known by hand.
     #[test]
     fn a_spread_of_known_numbers_has_their_figures() {
         let mut spread = Spread::default();
