@@ -21,7 +21,7 @@ pub(crate) const BUDGETS: [(&str, usize); 20] = [
     ("firmware/lockstep", 200),
     ("host-sim", 3_100),
     ("host-sim/analysis", 8_700),
-    ("host-sim/batch", 12_400),
+    ("host-sim/batch", 12_300),
     ("host-sim/campaign", 4_000),
     ("host-sim/log", 5_400),
     ("host-sim/pil", 1_900),

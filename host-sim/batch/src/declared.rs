@@ -15,7 +15,7 @@ const ASKS_EVERY_MS: u32 = 1000;
 const LOW_MS: u32 = 100;
 
 /// In place of faults where the ECU named none.
-pub(crate) const UNNAMED: &str = "none named";
+pub const UNNAMED: &str = "none named";
 
 /// Guidance left although nothing was wrong.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,11 +30,12 @@ pub struct Declaration {
 }
 
 /// Driver and host, who ask for guidance, and who listens to what the ECU says.
-pub(crate) struct Listener {
+pub struct Listener {
     receiver: ReceiverState,
-    pub(crate) reported: Reported,
+    /// What the ECU did so far.
+    pub reported: Reported,
     /// The last frame of the ECU.
-    pub(crate) said: Option<GuidanceMessage>,
+    pub said: Option<GuidanceMessage>,
     faults: FaultSet,
     /// Steps since guidance left; none while it is there.
     away: Option<u32>,
@@ -44,13 +45,13 @@ pub(crate) struct Listener {
 }
 
 /// What the ECU did in a segment.
-pub(crate) struct Reported {
+pub struct Reported {
     /// At its end.
-    pub(crate) mode: Mode,
+    pub mode: Mode,
     /// Steps with guidance.
-    pub(crate) active: u32,
+    pub active: u32,
     /// What took guidance away.
-    pub(crate) declarations: Vec<Declaration>,
+    pub declarations: Vec<Declaration>,
 }
 
 impl Reported {
@@ -64,7 +65,10 @@ impl Reported {
 }
 
 impl Listener {
-    pub(crate) fn new() -> Self {
+    /// Before the first step: guidance is there, and nothing was said.
+    #[must_use]
+    #[allow(clippy::new_without_default, reason = "a listener begins, it is not empty")]
+    pub fn new() -> Self {
         Self {
             receiver: ReceiverState::TRUSTED,
             said: None,
@@ -85,7 +89,7 @@ impl Listener {
     }
 
     /// Whether guidance is asked for.
-    pub(crate) fn engages(&self) -> bool {
+    pub fn engages(&self) -> bool {
         match self.away {
             None => true,
             // A handover goes on while the request stays.
@@ -103,7 +107,7 @@ impl Listener {
     }
 
     /// Takes the guidance frame of a step.
-    pub(crate) fn take_frame(&mut self, time_s: f64, frame: Option<&Frame>) {
+    pub fn take_frame(&mut self, time_s: f64, frame: Option<&Frame>) {
         self.steps += 1;
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {

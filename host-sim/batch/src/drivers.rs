@@ -116,12 +116,13 @@ pub(crate) fn identified_driver(
 }
 
 /// What is compared with the truth: the parameters that a torque record can carry.
-pub(crate) const COMPARED: usize = 5;
+pub const COMPARED: usize = 5;
 
 /// A parameter's key, what was found, and the truth.
-pub(crate) type Compared = (&'static str, Parameter, f64);
+pub type Compared = (&'static str, Parameter, f64);
 
-pub(crate) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
+/// Every parameter that is compared.
+pub fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
     let sum = truth.k_d + Muscle::default().k_nms;
     [
         ("gain_1", found.gain_1, sum * truth.a_1),

@@ -65,7 +65,7 @@ mod recorder;
 pub mod reliance;
 pub mod run;
 mod sobol;
-mod statistics;
+pub mod statistics;
 pub mod study;
 pub mod sweep;
 

@@ -8,15 +8,15 @@ use crate::error::StudyError;
 use haptic_sim::input::in_range;
 use haptic_sim::share::{Z_95, wilson_of};
 
-/// None of none.
-pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+/// The mean; none of none.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut count = 0_usize;
     let sum: f64 = values.into_iter().inspect(|_| count += 1).sum();
     (count > 0).then(|| sum / count as f64)
 }
 
 /// Root of the mean square; none of none.
-pub(crate) fn rms(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub fn rms(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     mean(values.into_iter().map(|value| value * value)).map(f64::sqrt)
 }
 

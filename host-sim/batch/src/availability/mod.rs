@@ -23,7 +23,7 @@ mod segment;
 use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
 
-pub use crate::declared::Declaration;
+pub use crate::declared::{Declaration, Listener, Reported, UNNAMED};
 pub use crate::statistics::Rate;
 pub use roads::{ROADS, Road};
 pub use segment::{ByHand, DriveSegment, Ended, SegmentNumber};

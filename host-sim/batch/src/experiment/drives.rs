@@ -12,18 +12,21 @@ use crate::error::StudyError;
 use crate::recorder::recorded;
 
 /// A drive with what is needed to judge it.
-pub(super) struct Driven {
-    pub(super) scenario: Scenario,
-    pub(super) log: DriveLog,
+pub struct Driven {
+    /// What was driven.
+    pub scenario: Scenario,
+    /// How it was recorded.
+    pub log: DriveLog,
     pub(super) path: Vec<(f64, f64)>,
-    pub(super) away: Away,
+    /// When the guidance was away.
+    pub away: Away,
 }
 
 /// The guided drives of a plan, each participant so often: number, driver, and what counts on from the plan's seed.
-pub(super) fn guided(
-    plan: &ExperimentPlan,
-    drives: u32,
-) -> Result<Vec<(u32, PublishedDriver, u64)>, StudyError> {
+///
+/// # Errors
+/// An unknown participant.
+pub fn guided(plan: &ExperimentPlan, drives: u32) -> Result<Vec<(u32, PublishedDriver, u64)>, StudyError> {
     let chosen = chosen(&plan.participants)?;
     let of = |p: &Participant| {
         let (number, driver) = (p.number, p.guided);
@@ -33,16 +36,18 @@ pub(super) fn guided(
 }
 
 /// Lets a published driver drive alone, with a remnant and the paper's sensors.
-pub(super) fn driven(
-    plan: &ExperimentPlan,
-    number: u32,
-    truth: &PublishedDriver,
-) -> Result<Driven, StudyError> {
+///
+/// # Errors
+/// A probe that the controller refuses.
+pub fn driven(plan: &ExperimentPlan, number: u32, truth: &PublishedDriver) -> Result<Driven, StudyError> {
     driven_by(plan, number, truth, truth.parameters())
 }
 
 /// Lets a driver drive who differs from the published one in what the log does not name.
-pub(super) fn driven_by(
+///
+/// # Errors
+/// A probe that the controller refuses.
+pub fn driven_by(
     plan: &ExperimentPlan,
     number: u32,
     truth: &PublishedDriver,
@@ -52,7 +57,10 @@ pub(super) fn driven_by(
 }
 
 /// What a published driver drives with a remnant and the paper's sensors.
-pub(super) fn scenario_of_drive(
+///
+/// # Errors
+/// A probe that the controller refuses.
+pub fn scenario_of_drive(
     plan: &ExperimentPlan,
     number: u32,
     truth: &PublishedDriver,

@@ -45,10 +45,10 @@ use haptic_sim::scenario::Scenario;
 
 use crate::Away;
 use crate::drivers::identified_driver;
-pub use crate::drivers::{Probe, truth_of};
+pub use crate::drivers::{COMPARED, Compared, Probe, compared, truth_of};
 use crate::engine::{Watch, logs, runs};
 use crate::error::StudyError;
-use drives::{Driven, scenario_of_drive};
+pub use drives::{Driven, driven, driven_by, guided, scenario_of_drive};
 
 /// The paper's trajectory errors with guidance over its participants: smallest, mean, largest, m (4.4).
 pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];
@@ -66,7 +66,8 @@ pub struct ExperimentPlan {
 
 impl ExperimentPlan {
     /// The drives of a repetition, from 0: other remnants.
-    fn repetition(&self, number: u64) -> Self {
+    #[must_use]
+    pub fn repetition(&self, number: u64) -> Self {
         Self {
             seed: self.seed.wrapping_add(number),
             ..self.clone()
@@ -203,7 +204,10 @@ pub fn experiment(plan: &ExperimentPlan, watch: &Watch<'_>) -> Result<Experiment
 }
 
 /// The participants of these numbers.
-fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, StudyError> {
+///
+/// # Errors
+/// A number that none has.
+pub fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, StudyError> {
     let found = |&number| Ok(participant("participant", number)?);
     numbers.iter().map(found).collect()
 }
