@@ -126,7 +126,7 @@ enum Beside {
     Sensors,
     /// Gusts, friction and a motor with a lag, on the paper's tyres.
     Wind,
-    /// The world `everything` of `host-sim availability`, each car another.
+    /// The world `everything` of `cargo xtask availability`, each car another.
     Everything,
 }
 

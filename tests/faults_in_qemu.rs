@@ -1,5 +1,5 @@
 //! The rows of the fault campaign that a target has to show as well, with one seed each; bits flip in its memory.
-//! More of them: `host-sim faults --target --seeds 20`.
+//! More of them: `cargo xtask faults --target --seeds 20`.
 
 use haptic_campaign::table::{Class, FaultCase, Place, rows};
 use haptic_campaign::{World, target};

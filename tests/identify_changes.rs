@@ -1,7 +1,8 @@
 //! Drivers who change while they drive in closed loop: seen, when, and with what truth in the pieces.
 
 use haptic_batch::engine::Watch;
-use haptic_batch::experiment::{ChangesLine, ExperimentPlan, changes};
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_evidence::estimates::{ChangesLine, changes};
 
 fn line(participants: Vec<u32>, drives: u32, kind: &str) -> ChangesLine {
     let plan = ExperimentPlan {

@@ -3,7 +3,8 @@
 
 use haptic_analysis::identify::{DriveLog, Identification, Options, Parameter, identify_with_noise_model};
 use haptic_batch::engine::Watch;
-use haptic_batch::experiment::{ExperimentPlan, Recorder, experiment, repeat};
+use haptic_batch::experiment::{ExperimentPlan, Recorder, experiment};
+use haptic_evidence::estimates::repeat;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::participants::{PublishedDriver, participants};
 use haptic_sim::scenario::{Scenario, Sensors};

@@ -1,12 +1,13 @@
 //! Logs as cars and simulators really record them, with a known truth: nothing that is wrong may be called identified, what
 //! is wrong with the sensors has to be named, and what is only noisy must not be given up.
 //!
-//! Three participants and one seed here; `host-sim validate --corruptions 20` drives all of them.
+//! Three participants and one seed here; `cargo xtask validate --corruptions 20` drives all of them.
 
 use std::sync::LazyLock;
 
 use haptic_batch::engine::Watch;
-use haptic_batch::experiment::{CorruptionLine, Corruptions, ExperimentPlan, corruptions};
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_evidence::estimates::{CorruptionLine, Corruptions, corruptions};
 
 static FOUND: LazyLock<Corruptions> = LazyLock::new(|| {
     let plan = ExperimentPlan {

@@ -8,7 +8,7 @@ use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::scenario::{GuidanceParameters, Scenario};
 use haptic_sim::{Action, Simulation, simulation};
 
-/// 14 drivers x 2 seeds, four sessions each, against the required bounds. (`host-sim reliance` has 20 seeds.)
+/// 14 drivers x 2 seeds, four sessions each, against the required bounds. (`cargo xtask reliance` has 20 seeds.)
 #[test]
 fn all_participants_are_read_live() {
     let plan = ReliancePlan {

@@ -15,9 +15,9 @@ const LEANING: [&str; 5] = ["The same", "Of", "As", "With", "Those"];
 
 /// Crates with comments of that kind from before this rule, and how many at most. A number only ever falls.
 const NOT_YET: [(&str, usize); 3] = [
-    ("host-sim/analysis", 24),
-    ("host-sim/batch", 64),
-    ("host-sim/report", 21),
+    ("host-sim/analysis", 21),
+    ("host-sim/batch", 13),
+    ("host-sim/report", 1),
 ];
 
 /// The text of a doc comment's line, and its marker.

@@ -1,7 +1,8 @@
 """A headless Chromium, spoken to through a pipe: browser.py PAGE SCRIPT DATA... [--axe AXE.js PICTURES]
 
 Runs the script in the page, with the texts of the data as the list EXPECTED, and prints the lines that it returns. With --axe every
-step of the page is looked at by axe-core, in light and dark, and photographed.
+step of the page is looked at by axe-core, in light and dark, and photographed; and at three sizes for words that lie over each other or
+are cut off.
 """
 
 import base64
@@ -121,7 +122,43 @@ def accessible(browser, page, axe, pictures):
             theme = "dark" if dark else "light"
             browser.picture(Path(pictures) / f"{step}-{theme}.png")
             found = browser.run(AXE)
+            if browser.run("!document.getElementById('ask').hidden"):
+                browser.run("document.querySelector('[data-guess=shown]').click()")
+                browser.run(DONE)
+                found = " | ".join(filter(None, [found, browser.run(AXE)]))
             print(f"{'FAILED' if found else 'ok'} axe, {step}, {theme}: {found or 'nothing serious'}")
+
+
+SIZES = {"phone": (360, 740), "tablet": (1024, 768), "desk": (1600, 900)}
+# Words of the pictures that lie over each other by more than a pixel, or beyond their picture.
+CROWDED = """(() => {
+  const found = [], words = [...document.querySelectorAll("svg text")].filter(text => text.textContent.trim() && text.getClientRects().length);
+  const boxes = words.map(text => text.getBoundingClientRect());
+  words.forEach((text, i) => {
+    const a = boxes[i], around = text.ownerSVGElement.getBoundingClientRect();
+    if (a.right > around.right + 1 || a.left < around.left - 1) found.push(`cut: ${text.textContent}`);
+    for (let k = i + 1; k < words.length; k++) {
+      const b = boxes[k], wide = Math.min(a.right, b.right) - Math.max(a.left, b.left), tall = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+      if (wide > 1 && tall > 3) found.push(`${text.textContent} over ${words[k].textContent}`);
+    }
+  });
+  return [...new Set(found)].join(" | ");
+})()"""
+
+
+def legible(browser, page, pictures):
+    """A line for each step and size: words that cannot be read."""
+    for name, size in SIZES.items():
+        browser.size(*size, calm=True)
+        browser.open(page)
+        for step in STEPS:
+            browser.run(f"page.go('{step}')")
+            browser.run(DONE)
+            browser.run("document.querySelector('#ask:not([hidden]) [data-guess=shown]')?.click()")
+            browser.run(DONE)
+            browser.picture(Path(pictures) / f"{step}-{name}.png", full=True)
+            found = browser.run(CROWDED)
+            print(f"{'FAILED' if found else 'ok'} words, {step}, {name}: {found or 'all legible'}")
 
 
 def main(page, script, *rest):
@@ -132,6 +169,7 @@ def main(page, script, *rest):
         print(browser.run(f"(() => {{ const EXPECTED = {texts};\n{Path(script).read_text()} }})()"))
         if looks:
             accessible(browser, page, *looks)
+            legible(browser, page, looks[1])
         for event in browser.events:
             if event.get("method") == "Runtime.exceptionThrown":
                 print("FAILED the page's own error:", json.dumps(event["params"]["exceptionDetails"])[:400])

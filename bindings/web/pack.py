@@ -9,7 +9,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 # In order: each uses what stands before it.
-SCRIPTS = ["strings", "engine", "chart", "drives", "scene", "loop", "story", "hand", "share", "page", "places"]
+SCRIPTS = ["strings", "engine", "chart", "drives", "scene", "loop", "guess", "story", "hand", "force", "share", "page", "places"]
 
 
 def part(name):

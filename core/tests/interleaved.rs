@@ -236,6 +236,27 @@ fn a_column_that_hides_the_driver_is_lost_within_a_tenth_of_a_second() {
     }
 }
 
+/// Each frame of a rogue repeats the counter that the true sender just had: it speaks for two senders with 8, the next true one against
+/// that with 1. After nineteen, 8*19 - 18 are no less than 128, and the column is lost in that step: its last value is not used until
+/// its time-out.
+#[test]
+fn a_column_with_two_senders_is_lost_in_the_step_in_which_they_are_found() {
+    let mut rig = Rig::active_in_curve(1.0);
+    while !rig.ticks.is_multiple_of(PERIOD_MS[COLUMN]) {
+        rig.tick();
+    }
+    rig.silent[COLUMN] = true;
+    for lies in 1..=19 {
+        let honest = rig.frame(COLUMN);
+        assert_eq!(rig.send(&honest), Ok(()), "{lies}");
+        let lie = column(lies, honest.data()[1] & 15);
+        assert_eq!(rig.send(&lie), Err(Reject::Repeated), "{lies}");
+        let faults = tick_uncounted(&mut rig, COLUMN).command.faults;
+        assert_eq!(faults.contains(Fault::ColumnTimeout), lies == 19, "{lies}");
+        tick_uncounted(&mut rig, COLUMN);
+    }
+}
+
 /// Where the rogue stops, the true sender is believed after 128 frames in order; up to 14 come before it is in order again.
 #[test]
 fn trust_comes_back_after_a_hundred_and_twenty_eight_frames() {

@@ -13,7 +13,7 @@
 //! | read what decides the torque | [`haptic_core`] |
 //!
 //! `docs/design.md` draws how they depend on each other. The program is `src/main.rs`, with a file for each of its
-//! commands below `src/cli`; the library holds what needs both the simulator and a target:
+//! commands below `src/cli`; beside them the library holds what needs both the simulator and a target:
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -31,6 +31,7 @@
 //! # Ok::<(), haptic_sim::scenario::ScenarioError>(())
 //! ```
 
+pub mod cli;
 pub mod processor;
 
 /// The examples of the documents, as doctests.

@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::host_sim;
+use crate::{host_sim, program};
 
 fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).expect("stdout is one JSON value and nothing else")
@@ -337,7 +337,7 @@ fn a_study_fits_the_terminal_and_names_its_report() {
     // A wider terminal shows more columns; that is asked of those that take no time.
     let wide = studies[1..4].iter().map(|study| (*study, 100));
     for (arguments, width) in studies.iter().map(|study| (*study, 80)).chain(wide) {
-        let output = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        let output = program(arguments.first().copied())
             .args(arguments)
             .env("COLUMNS", width.to_string())
             .current_dir(directory.path())
@@ -549,7 +549,7 @@ fn what_a_processor_in_the_loop_lacks_is_named_and_exits_with_2() {
 /// Runs the program until it `has_begun`, and presses Ctrl-C.
 #[cfg(unix)]
 fn interrupted(directory: &Path, arguments: &[&str], has_begun: impl Fn() -> bool) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+    let mut child = program(arguments.first().copied())
         .args(arguments)
         .current_dir(directory)
         .stderr(std::process::Stdio::piped())

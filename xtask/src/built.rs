@@ -34,10 +34,19 @@ impl Built {
 
     /// The command line to check others with: that of daily work, which computes the same bits as the one that is handed on.
     pub(crate) fn host_sim(self) -> Result<PathBuf> {
-        let built = match self {
+        Ok(self.daily().package("host-sim")?.join(HOST_SIM))
+    }
+
+    /// The program behind `cargo xtask faults`, likewise.
+    pub(crate) fn evidence(self) -> Result<PathBuf> {
+        let name = format!("evidence{}", std::env::consts::EXE_SUFFIX);
+        Ok(self.daily().package("haptic-evidence")?.join(name))
+    }
+
+    fn daily(self) -> Self {
+        match self {
             Self::ForTests => self,
             Self::Daily | Self::ToShip => Self::Daily,
-        };
-        Ok(built.package("host-sim")?.join(HOST_SIM))
+        }
     }
 }

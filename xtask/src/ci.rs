@@ -392,12 +392,12 @@ fn fuzz() -> Result<()> {
 }
 
 fn campaign() -> Result<()> {
-    let host_sim = Built::ForTests.host_sim()?;
+    let evidence = Built::ForTests.evidence()?;
     let seeds = ["faults", "--seeds", "500"];
     // The paper's drivers in the paper's world, then those who keep the lane in a real one.
-    run(command(&host_sim.to_string_lossy()).args(seeds))?;
+    run(command(&evidence.to_string_lossy()).args(seeds))?;
     for world in ["calibrated", "everything", "braking", "camera"] {
-        run(command(&host_sim.to_string_lossy())
+        run(command(&evidence.to_string_lossy())
             .args(seeds)
             .args(["--world", world]))?;
     }

@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 20] = [
+pub(crate) const BUDGETS: [(&str, usize); 21] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -19,16 +19,17 @@ pub(crate) const BUDGETS: [(&str, usize); 20] = [
     ("examples", 200),
     ("firmware", 2_700),
     ("firmware/lockstep", 200),
-    ("host-sim", 3_100),
+    ("host-sim", 2_700),
     ("host-sim/analysis", 8_700),
-    ("host-sim/batch", 12_300),
+    ("host-sim/batch", 10_300),
     ("host-sim/campaign", 4_000),
+    ("host-sim/evidence", 3_900),
     ("host-sim/log", 5_400),
     ("host-sim/pil", 1_900),
-    ("host-sim/report", 6_700),
-    ("host-sim/sim", 8_900),
+    ("host-sim/report", 5_400),
+    ("host-sim/sim", 8_800),
     ("host-sim/vectorised", 2_800),
-    ("xtask", 6_400),
+    ("xtask", 6_500),
     ("xtask/log", 100),
 ];
 

@@ -11,6 +11,7 @@ mod by_hand;
 mod c_library;
 mod callgrind;
 mod ci;
+mod claims;
 mod code;
 mod coverage;
 mod dist;
@@ -38,7 +39,7 @@ mod venv;
 mod web;
 mod wheel;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -132,11 +133,8 @@ enum Command {
         #[arg(long)]
         ran: bool,
     },
-    /// Recordings of real people below a directory of the user's: `host-sim real-drives`, built for it.
-    RealDrives {
-        /// The directory.
-        directory: PathBuf,
-    },
+    #[command(flatten)]
+    Claim(claims::Claim),
     /// Lines of code by crate, without tests, comments and blanks, beside the budget of each (a test holds it).
     Lines,
     /// The documents as a book to browse, in target/book/html (needs mdbook). Exit code 1 if a link leads nowhere.
@@ -159,14 +157,6 @@ enum Bench {
     Speed(speed::Options),
     /// The identification of a recorded drive: ours and SciPy's, to the same loss.
     Identify,
-}
-
-fn real_drives(directory: &Path) -> anyhow::Result<()> {
-    tool::run(
-        tool::cargo()
-            .args(["run", "--release", "-q", "-p", "host-sim", "--", "real-drives"])
-            .arg(directory),
-    )
 }
 
 fn main() -> ExitCode {
@@ -210,10 +200,13 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        Command::Claim(claim) => match claim.run() {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
         Command::Trace { ran: true, .. } => trace::by_execution(&ci::logs()),
         Command::Trace { page: true, .. } => trace::page().map(|page| print!("{page}")),
         Command::Trace { .. } => trace::run(),
-        Command::RealDrives { directory } => real_drives(&directory),
         Command::Lines => lines::print(tool::root()).map_err(Into::into),
         Command::Book => book::build(),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),

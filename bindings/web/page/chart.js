@@ -112,8 +112,8 @@ class Chart {
     svg("path", { d: `M${X(x) - 9},${foot} h18 l-9,-14 z`, class: "knob" }));
     const to_ = value => moved(Math.min(to, Math.max(from, step * Math.round(value / step))));
     knob.addEventListener("keydown", event => {
-      const by = { ArrowLeft: -step, ArrowRight: step, PageDown: -5, PageUp: 5 }[event.key];
-      if (by) { event.preventDefault(); to_(x + by); }
+      const by = { ArrowLeft: -step, ArrowRight: step, PageDown: -5, PageUp: 5, Home: from - x, End: to - x }[event.key];
+      if (by !== undefined) { event.preventDefault(); to_(x + by); }
     });
     knob.addEventListener("pointerdown", event => {
       event.preventDefault();

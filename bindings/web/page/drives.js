@@ -102,7 +102,8 @@ class Drives {
 
   job(settings, { law = "", steps = 107000, csv = false } = {}) {
     const toml = scenario(settings), text = settings.law === "own" ? law : "";
-    return { key: JSON.stringify([toml, settings.law ?? "shipping", text, steps, csv]), toml, law: settings.law ?? "shipping", text, steps, csv, window: windowOf(settings) };
+    const { law: name = "shipping", sweep } = settings;
+    return { key: JSON.stringify([toml, name, text, steps, csv, sweep]), toml, law: name, text, steps, csv, sweep, window: windowOf(settings) };
   }
 
   // These drives are wanted, in this order, and no others any more; those that are there.

@@ -6,7 +6,7 @@ const MOST_STEPS = 120;
 
 class LiveDrive {
   #lab; #target_rad = 0; #keys = 0; #last = null; #real_ms = 0; #driven_ms = 0; #rumbled = 0;
-  going = false; settings = null; failed_s = Infinity; road = []; told = ""; note = ""; asked = ""; give = null;
+  going = false; settings = null; failed_s = Infinity; road = []; told = ""; note = ""; asked = ""; give = null; isFelt = () => false;
 
   constructor(lab, canvas) {
     this.#lab = lab;
@@ -43,6 +43,7 @@ class LiveDrive {
   }
 
   now() { return this.#lab.now(); }
+  get target_rad() { return this.#target_rad; }
 
   #torque(now) {
     if (this.give) return this.give(now);
@@ -76,7 +77,8 @@ class LiveDrive {
 
   #pads(dt_s, time) {
     const pad = [...navigator.getGamepads?.() ?? []].find(found => found?.connected);
-    if (pad && Math.abs(pad.axes[0]) > 0.02) {
+    // A pad that rests is not the hand that steers; a wheel that is felt always is.
+    if (pad && (this.isFelt() || Math.abs(pad.axes[0]) > 0.02)) {
       const isWheel = /wheel|racing|g2[0-9]|g9[0-9]{2}|t[0-9]{3}|fanatec/i.test(pad.id);
       this.#target_rad = -pad.axes[0] * (isWheel ? HAND.wheel_rad : HAND.range_rad);
       this.told = t("input_found", { what: t("input_wheel", { name: pad.id.slice(0, 40) }) });

@@ -9,8 +9,8 @@ const WAYS = [
   { way: "M49,92 V31 H138", lit: ["e_y", 0.15], part: "driver" },
   { way: "M49,136 V199 H138", lit: ["e_y", 0.15], part: "ecu" },
   { way: "M250,31 H358 V62", lit: ["driver", 0.6], kind: "driver", text: [264, 24], symbol: "T_d", part: "driver" },
-  { way: "M250,199 H272 V92 H306", lit: ["guidance", 0.5], kind: "guidance", text: [266, 152], anchor: "end", symbol: "T_h", part: "ecu" },
-  { way: "M358,106 V146", lit: ["wheel", 0.2], text: [352, 131], anchor: "end", symbol: "phi", part: "wheel", degrees: true },
+  { way: "M250,199 H272 V92 H306", lit: ["guidance", 0.5], kind: "guidance", text: [262, 152], anchor: "end", symbol: "T_h", part: "ecu" },
+  { way: "M358,106 V146", lit: ["wheel", 0.2], text: [346, 131], anchor: "end", symbol: "phi", part: "wheel", degrees: true },
   { way: "M358,190 V240 H20 V136", lit: ["error", 0.15], text: [186, 256], symbol: "error", part: "car" },
   { way: "M160,176 V54", lit: ["guidance", 0.5], kind: "guidance dashed", text: [154, 120], anchor: "end", part: "felt", word: "loop_felt" },
 ];
@@ -92,9 +92,9 @@ class Needle {
     this.#truth.setAttribute("visibility", truth === null ? "hidden" : "visible");
     this.#hand.setAttribute("visibility", known ? "visible" : "hidden");
     this.#fan.setAttribute("visibility", known ? "visible" : "hidden");
-    const words = known ? t("needle_words", { told: told.toFixed(2), deviation: deviation.toFixed(2), truth: truth?.toFixed(2) ?? "?" }) : t("needle_none");
+    const words = known ? t("needle_words", { told: sure(told, deviation), truth: truth?.toFixed(2) ?? "?" }) : t("needle_none");
     if (this.#root.getAttribute("aria-label") !== words) this.#root.setAttribute("aria-label", words);
-    this.#text.textContent = known ? `K_hg ${told.toFixed(2)} ± ${deviation.toFixed(2)}` : "K_hg ?";
+    this.#text.textContent = known ? `K_hg ${sure(told, deviation)}` : "K_hg ?";
     if (!known) return;
     this.#hand.setAttribute("transform", turn(told));
     const [a, b] = [this.#at(told - 2 * deviation, 88), this.#at(told + 2 * deviation, 88)];

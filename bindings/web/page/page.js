@@ -13,7 +13,9 @@ function el(name, attributes = {}, ...children) {
 const ORDER = ["loop", "guidance", "reliance", "failure", "handover", "probe", "compare", "drive", "law"];
 const START = { a: { ...PLAIN, t_p: 0.5, ...onLine(0), course: "bends" }, b: { ...PLAIN, t_p: 0.5, ...onLine(0), course: "bends", fail: "torque", at: 30 } };
 
-let S, lab, drives, live, scene, needle, view, results = {}, last = {}, charts = [], loopPicture = null;
+let S, lab, drives, live, felt, scene, needle, view, results = {}, last = {}, charts = [], loopPicture = null;
+// Where the paper's first bend begins to turn the car, s.
+const BEFORE_S = 67;
 const clock = { at: 0, from: 0, to: 1, playing: true, before: null, key: "" };
 const frames = [];
 
@@ -39,10 +41,11 @@ function notice(text) {
   $("notice").hidden = text === "";
 }
 
+const isMoving = () => !matchMedia("(prefers-reduced-motion: reduce)").matches;
 function go(step) {
   if (live.going && step !== "drive") live.end();
   say({ step });
-  clock.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  clock.playing = isMoving();
   scrollTo({ top: 0 });
 }
 
@@ -68,11 +71,13 @@ function instants(settings, { channels, failed_s }) {
   return { marks, spans };
 }
 
-function lineOf({ drive, channel, name, kind, scale = 1, truth }, x) {
+function lineOf({ drive, channel, name, kind, scale = 1, truth, peaks, of }, x) {
   if (truth !== undefined) return { x, y: [truth, truth], name, kind };
+  if (peaks) return results[peaks]?.peaks ? { x: results[peaks].peaks.at, y: results[peaks].peaks[of], name, kind } : null;
   const found = results[drive]?.channels;
   if (!found) return null;
-  return { x: found.time, y: scale === 1 ? found[channel] : found[channel].map(value => value * scale), name, kind };
+  const times = typeof scale === "function" ? scale(results[drive]) : scale;
+  return { x: found.time, y: times === 1 ? found[channel] : found[channel].map(value => value * times), name, kind };
 }
 function bandOf({ drive, channel, band, kind }) {
   const found = results[drive]?.channels;
@@ -82,29 +87,30 @@ function bandOf({ drive, channel, band, kind }) {
 }
 
 function drawCharts() {
-  const wide = $("stage").clientWidth > 620, panels = view.figure && !wide ? view.panels.filter(panel => panel.mine) : view.panels;
-  const shape = `${S.step} ${panels.length}`;
+  const width = $("stage").clientWidth, wide = width > 480, panels = view.figure && !wide ? view.panels.filter(panel => panel.mine) : view.panels;
+  const shape = `${S.step} ${panels.length} ${width > 780}`;
   if ($("charts").dataset.shape !== shape) {
     $("charts").dataset.shape = shape;
-    $("charts").className = view.figure && wide ? "charts beside" : `charts of${Math.min(5, panels.length)}`;
-    charts = panels.map(() => {
-      const host = el("div", { class: "plot" }), chart = new Chart(host);
-      host.addEventListener("pointerdown", event => { const at = chart.at(event); if (at !== null && !live.going && !event.target.closest(".handle")) clock.at = at; });
+    $("charts").className = view.figure && wide ? `charts beside${width > 780 ? "" : " two"}` : `charts of${Math.min(5, panels.length)}`;
+    charts = panels.map(({ still }) => {
+      const host = el("div", { class: still ? "plot instants" : "plot" }), chart = new Chart(host);
+      host.addEventListener("pointerdown", event => { const at = chart.given?.still ? null : chart.at(event); if (at !== null && !live.going && !event.target.closest(".handle")) clock.at = at; });
       return { host, chart };
     });
     $("charts").replaceChildren(...charts.map(({ host }) => host));
   }
   panels.forEach((panel, i) => {
     const x = [clock.from, clock.to], lines = panel.lines.map(line => lineOf(line, x)).filter(Boolean);
-    if (!lines.length) return;
+    if (!lines.length && !panel.still) return;
     const marks = [], spans = [];
-    for (const drive of panel.marksOf ? [panel.marksOf] : [...new Set(panel.lines.map(line => line.drive))]) {
+    for (const drive of panel.still ? [] : panel.marksOf ? [panel.marksOf] : [...new Set(panel.lines.map(line => line.drive))]) {
       if (!results[drive]?.channels) continue;
       const found = instants(view.drives[drive], results[drive]);
       for (const mark of found.marks) if (!marks.some(other => other.name === mark.name && Math.abs(other.x - mark.x) < 0.1)) marks.push(mark);
       spans.push(...found.spans);
     }
-    charts[i].chart.set({ ...panel, x: panel.x ?? x, lines, marks, spans, bands: panel.lines.map(bandOf).filter(Boolean) });
+    const y = panel.fromZero ? [0, 1.05 * Math.max(0.1, ...lines.flatMap(line => line.y))] : panel.y;
+    charts[i].chart.set({ ...panel, x: panel.x ?? x, y, lines, marks, spans, bands: panel.lines.map(bandOf).filter(Boolean) });
   });
 }
 
@@ -162,17 +168,17 @@ function drawControls() {
     place.replaceChildren(...[...groups].map(([key, list]) => key ? el("fieldset", { class: `of-${key}` }, el("legend", {}, key.toUpperCase()), ...list) : el("div", {}, ...list)));
   }
   // Two columns of settings want the width of the pictures.
-  const home = view.numbers ? $("stage") : $("panel");
-  if (place.parentElement !== home) home.insertBefore(place, view.numbers ? null : $("editor"));
+  const isWide = view.numbers && innerWidth > 900, home = isWide ? $("stage") : $("panel");
+  if (place.parentElement !== home) home.insertBefore(place, isWide ? null : $("editor"));
   for (const control of controls) control.told(placeOf(control)[control.key]);
 }
 
 function drawNumbers() {
-  $("numbers").hidden = !view.numbers || !results.a?.metrics || !results.b?.metrics;
-  if ($("numbers").hidden) return;
+  $("figures").hidden = !view.numbers || !results.a?.metrics || !results.b?.metrics;
+  if ($("figures").hidden) return;
   const rows = [["n_peak", "peak_lateral_error_m", "m"], ["n_mean", "mean_abs_lateral_error_m", "m"], ["n_after", "peak_lateral_error_after_failure_m", "m"], ["n_effort", "mean_abs_driver_torque_nm", "N.m"], ["n_guidance", "mean_abs_guidance_torque_nm", "N.m"], ["n_conflict", "conflict_time_share", "%"]];
-  const cell = (value, unit) => value === null || value === undefined ? "-" : unit === "%" ? (100 * value).toFixed(1) : value.toFixed(3);
-  $("numbers").replaceChildren(el("caption", {}, t("n_what")), el("tr", {}, ...["", "A", "B", t("n_difference")].map(text => el(text ? "th" : "td", text ? { scope: "col" } : {}, text))),
+  const cell = (value, unit) => value === null || value === undefined ? "-" : (unit === "%" ? (100 * value).toFixed(0) : value.toFixed(2)).replace(/^-(0(\.0*)?)$/, "$1");
+  $("numbers").replaceChildren(el("caption", {}, t("n_what")), el("tr", {}, ...["", "A", "B", t("n_difference")].map(text => el(text ? "th" : "td", text ? { scope: "col", class: /^[AB]$/.test(text) ? `name-${text.toLowerCase()}` : "" } : {}, text))),
     ...rows.map(([name, key, unit]) => {
       const [a, b] = [results.a.metrics[key], results.b.metrics[key]], both = a !== null && b !== null;
       return el("tr", {}, el("th", { scope: "row" }, `${t(name)} (${unit})`), el("td", {}, cell(a, unit)), el("td", {}, cell(b, unit)), el("td", {}, both ? cell(b - a, unit) : "-"));
@@ -193,14 +199,17 @@ function render() {
   keys.forEach((key, i) => {
     if (!found[i] && !isLive) missing++;
     if (found[i]?.wrong) wrong(t("wrong_drive", { what: found[i].wrong }));
-    results[key] = found[i]?.channels && !found[i].fault ? found[i] : before[key];
+    results[key] = (found[i]?.channels || found[i]?.peaks) && !found[i].fault ? found[i] : before[key];
+    // Peaks of other settings say nothing of these.
+    if (view.drives[key].sweep && !found[i]?.peaks) delete results[key];
   });
   if (isLive && live.settings) results.now = live.result();
   if (!missing) last[S.step] = { ...results };
   for (const node of document.querySelectorAll("#steps button")) node.removeAttribute("aria-current");
   const here = document.querySelector(`#steps [data-step=${S.step}]`);
   here.setAttribute("aria-current", "step");
-  here.parentElement.parentElement.parentElement.scrollLeft = here.offsetLeft - 60;
+  const nav = here.closest("nav");
+  nav.scrollLeft += here.getBoundingClientRect().left - nav.getBoundingClientRect().left - 60;
   $("head").textContent = t(`${S.step}_head`);
   $("text").textContent = t(`${S.step}_text`);
   $("do").textContent = STRINGS.en[`${S.step}_do`] ? t(`${S.step}_do`) : "";
@@ -210,15 +219,18 @@ function render() {
   drawCharts();
   drawNumbers();
   drawLoop();
-  needle.show(view.needle !== undefined);
+  drawGuess(S, view);
+  needle.show(view.needle !== undefined && !isAsked(S));
   $("editor").hidden = !view.editor;
-  $("live").hidden = $("found").hidden = !isLive;
+  $("live").hidden = $("found").hidden = $("felt").hidden = !isLive;
   $("player").hidden = isLive;
+  $("play").disabled = $("time").disabled = isAsked(S);
   if (view.editor) drawLaw(found[0]);
   if (isLive) drawLive();
-  const all = keys.every(key => results[key]?.metrics), left = keys.filter(key => results[key]?.now?.diverged);
-  if (all && !missing && !isLive) $("said").textContent = [view.says(results), ...left.map(name => t("not_finished", { name, time: results[name].now.time_s.toFixed(1) }))].join(" ");
-  else if (isLive || !missing) $("said").textContent = "";
+  const drawn = keys.filter(key => !view.drives[key].sweep), all = drawn.every(key => results[key]?.metrics), left = keys.filter(key => results[key]?.now?.diverged);
+  const asked = isAsked(S), isDriven = drawn.every(key => found[keys.indexOf(key)]);
+  if (all && isDriven && !isLive && !asked) $("said").textContent = [guessed(S, view.right?.(results)), view.says(results), ...left.map(name => t("not_finished", { name, time: results[name].now.time_s.toFixed(1) }))].join(" ").trim();
+  else if (isLive || asked || !missing) $("said").textContent = "";
   if (!missing) document.body.dataset.done = S.step;
   else delete document.body.dataset.done;
 }
@@ -230,7 +242,7 @@ function range() {
   const paper = Object.values(view.drives).every(settings => isPaper(settings)) && S.step !== "drive";
   [clock.from, clock.to] = paper && !view.whole ? STORY_S : paper ? [60, Math.max(61, end)] : [0, Math.max(10, end)];
   const key = `${S.step} ${clock.from}`;
-  if (clock.key !== key) { clock.key = key; clock.at = view.starts ?? (paper && !view.whole ? 67 : clock.from); }
+  if (clock.key !== key) { clock.key = key; clock.at = view.starts ?? (paper && !view.whole ? BEFORE_S : clock.from); }
   $("time").min = clock.from;
   $("time").max = clock.to;
 }
@@ -257,7 +269,9 @@ function frame(time) {
   else {
     const result = results[view?.plays];
     if (result?.channels?.time.length) {
-      if (clock.playing) clock.at += gone * 1e-3 * (view.rate ?? 1);
+      // What comes is not shown before it is guessed.
+      if (isAsked(S)) clock.at = view.starts ?? BEFORE_S;
+      else if (clock.playing) clock.at += gone * 1e-3 * (view.rate ?? 1);
       if (clock.at > clock.to || clock.at < clock.from) clock.at = clock.from;
       paint(instantAt(result, clock.at), result.road, view.drives[view.plays]);
     }
@@ -269,9 +283,10 @@ function frame(time) {
 function paint(now, road, settings) {
   const guided = settings.guided !== false, lost = settings.fail === "torque" && now.time_s >= settings.at;
   now.alarm = now.warning && guided ? t("alarm") : "";
+  now.name = view.numbers ? S.shown : "";
   now.note = !guided ? t("alone") : lost ? t("failed") : MODES[now.mode] && now.mode !== 2 ? MODES[now.mode] : "";
   scene.paint(now, road);
-  for (const { chart } of charts) chart.cursor(clock.at);
+  for (const { chart } of charts) if (!chart.given?.still) chart.cursor(clock.at);
   if (view.loop) loopPicture?.light(now.of);
   if (view.needle !== undefined) needle.set(now.of("k_hg"), now.of("deviation"), view.needle);
   if (document.activeElement !== $("time")) $("time").value = clock.at;

@@ -36,6 +36,13 @@ function startLive(give = null) {
   soon();
 }
 
+// A hand on the wheel of any step is a drive of the reader's own.
+function takeWheel() {
+  if (S.step !== "drive") go("drive");
+  // The step is drawn first: it shows the road that is driven.
+  setTimeout(() => { if (!live.going) startLive(); });
+}
+
 async function endLive(why = "") {
   live.end();
   $("told").textContent = `${why} ${t("drive_look")}`.trim();
@@ -55,7 +62,8 @@ function liveFrame(time) {
   now.alarm = now.warning && live.settings.guided ? t("alarm") : "";
   now.note = !live.settings.guided ? t("alone") : now.time_s >= live.failed_s ? t("failed") : "";
   scene.paint(now, live.road);
-  if (!live.going) return;
+  if (!live.going) { felt.stop(); return; }
+  felt.frame(time, -now.driver_torque_nm, live.target_rad);
   $("told").textContent = `${now.time_s.toFixed(0)} s. ${live.told}`;
   if (time - drawn > 500) {
     drawn = time;
@@ -87,6 +95,20 @@ function drawLaw(result) {
   numbers.replaceChildren(...Array.from({ length: lines }, (_, i) => el("span", { class: i + 1 === line ? "wrong" : "" }, `${i + 1}\n`)));
 }
 
+function listenFelt() {
+  const hold = $("felthold"), part = $("feltpart"), show = () => { felt.part = Number(part.value); $("feltis").textContent = `${(100 * felt.part).toFixed(0)} %`; };
+  felt = new FeltWheel(text => { $("feltsaid").textContent = text; hold.disabled = !felt.isThere; });
+  live.isFelt = () => felt.isThere;
+  show();
+  part.addEventListener("input", show);
+  $("feltconnect").addEventListener("click", () => felt.connect());
+  const isKey = event => event.key === " " && live.going && felt.isThere && !event.target.matches?.("input, select, textarea, summary, button:not(#felthold)");
+  hold.addEventListener("pointerdown", event => { hold.setPointerCapture(event.pointerId); felt.hold(true); });
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) hold.addEventListener(name, () => felt.hold(false));
+  addEventListener("keydown", event => { if (isKey(event)) { event.preventDefault(); felt.hold(true); } });
+  addEventListener("keyup", event => { if (event.key === " ") felt.hold(false); });
+}
+
 async function share(kind) {
   const note = text => { $("shared").textContent = text; };
   const isLive = S.step === "drive", settings = view.drives[view.plays], name = `haptic-${S.step}`;
@@ -101,9 +123,9 @@ async function share(kind) {
     if (csv) save(`${name}.csv`, "text/csv", csv); else note(t("shared_not"));
   } else {
     const road = dropped.has(settings.course) ? ` ${t("share_road_note", { name: settings.course })}` : "";
-    const what = isLive ? "share_person_note" : (settings.law ?? "shipping") !== "shipping" ? "share_law_note" : "share_toml_note";
+    const law = settings.law ?? "shipping", what = isLive ? "share_person_note" : law === "own" ? "share_own_note" : law === "shipping" ? "share_toml_note" : "share_law_note";
     note(t(what) + road);
-    save(`${name}.toml`, "text/plain", scenario(settings));
+    save(`${name}.toml`, "text/plain", scenario(settings) + (isLive ? "" : lawNote(settings)));
   }
 }
 
@@ -120,6 +142,7 @@ async function take(file) {
 
 function listen() {
   $("steps").replaceChildren(...ORDER.map((step, i) => el("li", {}, el("button", { type: "button", "data-step": step, onclick: () => go(step) }, i < 6 ? `${i + 1} ` : "", t(`s_${step}`)))));
+  for (const node of document.querySelectorAll("[data-name]")) node.setAttribute("aria-label", t(node.dataset.name));
   for (const node of document.querySelectorAll("[data-t]")) node.textContent = t(node.dataset.t);
   $("canvas").setAttribute("aria-label", t("scene_words"));
   $("needle").setAttribute("aria-label", t("needle_name"));
@@ -129,6 +152,9 @@ function listen() {
   $("play").addEventListener("click", () => { clock.playing = !clock.playing; });
   $("time").addEventListener("input", () => { clock.at = Number($("time").value); });
   $("start").addEventListener("click", () => startLive());
+  $("take").addEventListener("click", () => takeWheel());
+  $("canvas").addEventListener("pointermove", event => { $("canvas").classList.toggle("grab", !live.going && scene.isWheel(event)); });
+  $("canvas").addEventListener("pointerdown", event => { if (!live.going && scene.isWheel(event)) takeWheel(); });
   $("read").addEventListener("click", () => notice(""));
   $("road").addEventListener("change", event => { if (event.target.files[0]) take(event.target.files[0]); });
   for (const button of document.querySelectorAll("[data-share]")) button.addEventListener("click", () => share(button.dataset.share));
@@ -137,6 +163,7 @@ function listen() {
   addEventListener("hashchange", () => arrive());
   addEventListener("resize", soon);
   listenLaw();
+  listenFelt();
 }
 function arrive() {
   const { state, odd } = fromAddress(location.hash);
@@ -155,7 +182,7 @@ async function begin() {
   scene = new Scene($("canvas"));
   needle = new Needle($("needle"));
   live = new LiveDrive(lab, $("canvas"));
-  clock.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  clock.playing = isMoving();
   listen();
   arrive();
   requestAnimationFrame(frame);

@@ -28,6 +28,16 @@ class Scene {
     this.#wheel(instant, width, height);
   }
 
+  // Whether a pointer is on the steering wheel.
+  isWheel(event) {
+    const box = this.#canvas.getBoundingClientRect(), { x, y, radius } = this.#rim(box.width, box.height);
+    return Math.hypot(event.clientX - box.left - x, event.clientY - box.top - y) < radius + 14;
+  }
+  #rim(w, h) {
+    const radius = Math.min(0.24 * h, 0.15 * w);
+    return { radius, x: w / 2, y: h - radius - 10 };
+  }
+
   #road(instant, road, w, h) {
     const pen = this.#pen, c = this.#colors, horizon = 0.3 * h, eye_m = 1.25, focal = 0.62 * w;
     pen.fillStyle = c.sky; pen.fillRect(0, 0, w, horizon);
@@ -89,7 +99,7 @@ class Scene {
   }
 
   #wheel(instant, w, h) {
-    const pen = this.#pen, dash = 0.66 * h, radius = Math.min(0.24 * h, 0.15 * w), x = w / 2, y = h - radius - 10;
+    const pen = this.#pen, dash = 0.66 * h, { x, y, radius } = this.#rim(w, h);
     pen.fillStyle = "#18202a";
     pen.beginPath(); pen.moveTo(0, h); pen.lineTo(0, dash + 0.06 * h); pen.quadraticCurveTo(w / 2, dash - 0.05 * h, w, dash + 0.06 * h); pen.lineTo(w, h); pen.fill();
     pen.save(); pen.translate(x, y); pen.rotate(-instant.wheel_angle_rad);
@@ -109,6 +119,10 @@ class Scene {
     };
     label(t("hands_driver"), "T_d", instant.driver_torque_nm, 12, "left", HANDS.driver);
     label(t("hands_guidance"), "T_h", instant.guidance_torque_nm, w - 12, "right", HANDS.guidance);
+    if (instant.name) {
+      pen.fillStyle = shade(instant.name); pen.fillRect(10, 8, 30, 30);
+      this.#text(instant.name.toUpperCase(), 25, 29, { align: "center", size: 18, bold: true, color: shade("card") });
+    }
     if (instant.note) this.#text(instant.note, w - 12, 24, { align: "right", size: 12, bold: true, color: shade("ink") });
     if (instant.alarm) {
       pen.font = "600 15px system-ui, sans-serif";

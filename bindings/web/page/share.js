@@ -14,6 +14,7 @@ const GAIN = within(0, 50), SHARE = within(0, 10), INSTANT_S = within(0, 1e6), S
 const OF_PAGE = new Map([
   ["step", ["loop", text => oneOf(...ORDER)(text)]],
   ["t_p", [0.5, within(0.001, 2)]], ["k_hg", [0.5, SHARE]], ["at", [70, INSTANT_S]], ["who", [0.5, oneOf(...DELAYS)]], ["tried", [[], listOf(SHARE, 3)]],
+  ["guess", [[], listOf(isGuess, 5)]],
   ["part", ["", oneOf("", "road", "driver", "ecu", "wheel", "car", "felt")]], ["shown", ["a", oneOf("a", "b")]],
   ["course", ["bends", anyText]], ["guided", ["on", oneOf("on", "off", "surprise")]], ["speed", [60, SPEED_KMH]], ["law", [LAW, anyText]],
 ]);
@@ -78,4 +79,11 @@ async function png({ text, width, height }) {
   const canvas = el("canvas", { width: 2 * width, height: 2 * height });
   canvas.getContext("2d").drawImage(image, 0, 0, 2 * width, 2 * height);
   return new Promise(done => canvas.toBlob(done, "image/png"));
+}
+
+// The law of a drive as comment behind its scenario: a scenario file has no law of the page's own or of the library.
+function lawNote({ law = "shipping" }) {
+  if (law === "shipping") return "";
+  const words = law === "own" ? t("file_own_law").split("\n").concat(S.law.split(/\r\n|[\r\n]/)) : [t("file_law", { law: law.replace(/[\x00-\x1f\x7f]/g, " ") })];
+  return `\n${words.map(line => `# ${line.replace(/[\x00-\x08\x0b-\x1f\x7f]/g, " ")}`.trimEnd()).join("\n")}\n`;
 }

@@ -11,8 +11,11 @@ function law(see) {
     + 1 * see.e_theta_rate;
   return 0.25 * (near + far);
 }`;
+// A centimetre and a hundredth of a newton metre: a person, a road and a car differ by more than the next digit.
 const f2 = value => value === null || value === undefined ? "?" : value.toFixed(2);
-const f3 = value => value === null || value === undefined ? "?" : value.toFixed(3);
+const LEAST = 0.005;
+// A value with the digits that its standard deviation leaves.
+const sure = (value, deviation) => { const digits = deviation >= 0.095 ? 1 : 2; return `${value.toFixed(digits)} ± ${deviation.toFixed(digits)}`; };
 const peak = result => result?.metrics?.peak_lateral_error_m;
 const after = result => result?.metrics?.peak_lateral_error_after_failure_m;
 const effort = result => result?.metrics?.mean_abs_driver_torque_nm;
@@ -26,6 +29,27 @@ const DELAY = slider("t_p", 0.1, 0.5, 0.01, "s"), INSTANT = slider("at", 64, 100
 const RESISTS = slider("k_hg", 0, 1, 0.05, "", { low: "k_hg_low", high: "k_hg_high" });
 const THREE = choice("who", DELAYS.map(t_p => [t_p, WHO[t_p]]));
 
+// Every instant of the bend: the largest error of the eight seconds after a failure there.
+const sweepOf = (...kinds) => ({ from: 64, to: 100, every: 2, lasts: 8, kinds });
+const everyInstant = (s, say, lines, words) => panel("c_instants", "m", lines.map(([peaks, of, name, kind]) => ({ peaks, of, name, kind })),
+  { title: t("c_instants", words), x: [64, 100], xName: t("axis_instant"), fromZero: true, still: true, mine: true, handle: instantOf(s, say) });
+// Where a handover saves most, and where it is no better than to let go at once.
+function ofInstants({ at, torque, input }, who) {
+  const saved = at.map((_, i) => torque[i] - input[i]), best = saved.indexOf(Math.max(...saved)), worst = saved.indexOf(Math.min(...saved)), stretches = [];
+  at.forEach((instant, i) => {
+    if (saved[i] >= LEAST) return;
+    if (i && stretches.at(-1)?.[1] === at[i - 1]) stretches.at(-1)[1] = instant; else stretches.push([instant, instant]);
+  });
+  const where = stretches.map(([from, to]) => from === to ? t("instant", { from }) : t("instants", { from, to })).join(", ");
+  return [t("instants_best", { who, at: at[best], sudden: f2(torque[best]), handed: f2(input[best]) }), where ? t("instants_no_better", { where }) : "",
+    saved[worst] <= -LEAST ? t("instants_worse", { at: at[worst], by: f2(-saved[worst]) }) : ""].join(" ").trim();
+}
+// Which of two is nearer to the middle; within a tenth they are alike.
+const nearer = (one, other, [first, alike, second]) => one < 0.9 * other ? first : other < 0.9 * one ? second : alike;
+// What the ECU's reading excludes, two standard deviations to each side.
+const tellsOf = ({ k_hg, deviation }) => k_hg + 2 * deviation < 0.5 ? "relies" : k_hg - 2 * deviation > 0.5 ? "resists" : "either";
+const PHASES_S = [15, 30, 60];
+
 const STEPS = {
   loop: s => ({
     drives: { now: { t_p: 0.3 } }, plays: "now", loop: true,
@@ -37,15 +61,20 @@ const STEPS = {
       road: panel("c_eyes", "m", [{ drive: "now", channel: "e_y", kind: "now" }]),
     }[s.part] ?? panel("c_error", "m", [error("now", "", "now")])],
     controls: [],
-    says: ({ now }) => t("said_loop", { driver: f2(effort(now)), guidance: f2(now.metrics.mean_abs_guidance_torque_nm), peak: f2(peak(now)) }),
+    says: ({ now }) => {
+      const most = channel => Math.max(...now.channels[channel].map((value, i) => now.channels.s[i] >= 1080 && now.channels.s[i] <= 1740 ? Math.abs(value) : 0));
+      const guidance = now.metrics.mean_abs_guidance_torque_nm;
+      return t(STRINGS.en[`said_loop_${s.part}`] ? `said_loop_${s.part}` : "said_loop", { driver: f2(effort(now)), guidance: f2(guidance), peak: f2(peak(now)),
+        wheel: (180 / Math.PI * most("wheel")).toFixed(0), e_y: f2(most("e_y")), held: f2(0.5 * guidance) });
+    },
   }),
   guidance: s => ({
-    drives: { guided: { t_p: s.t_p }, alone: { t_p: s.t_p, guided: false } }, plays: "guided",
+    drives: { guided: { t_p: s.t_p }, alone: { t_p: s.t_p, guided: false } }, plays: "guided", asks: { t_p: f2(s.t_p) },
     panels: [panel("c_error", "m", [error("alone", t("alone"), "manual"), error("guided", t("guided_line"), "now")], { least: 0.15 }),
       panel("c_torque", "N.m", [{ drive: "guided", channel: "driver", name: t("driver_torque"), kind: "driver" }, { drive: "guided", channel: "guidance", name: t("guidance_torque"), kind: "guidance" }])],
     controls: [DELAY],
-    says: ({ guided, alone }) => t("said_guidance", { t_p: f2(s.t_p), alone: f3(peak(alone)), guided: f3(peak(guided)),
-      less: f3(Math.abs(peak(alone) - peak(guided))), word: t(peak(alone) >= peak(guided) ? "less_word" : "more_word") }),
+    right: ({ guided, alone }) => nearer(peak(guided), peak(alone), ["less", "same", "more"]),
+    says: ({ guided, alone }) => t("said_guidance", { t_p: f2(s.t_p), alone: f2(peak(alone)), guided: f2(peak(guided)) }),
   }),
   reliance: s => {
     const drives = {}, order = [s.who, ...DELAYS.filter(t_p => t_p !== s.who)];
@@ -53,49 +82,77 @@ const STEPS = {
       drives[`now${t_p}`] = { t_p, ...onLine(s.k_hg) };
       drives[`alone${t_p}`] = { t_p, guided: false };
     }
+    for (const [name, k_hg] of [["relies", 0], ["resists", 1]]) drives[name] = { t_p: s.who, ...onLine(k_hg) };
     for (const t_p of order) s.tried.forEach((k_hg, i) => { drives[`tried${i}${t_p}`] = { t_p, ...onLine(k_hg) }; });
     return {
-      drives, plays: `now${s.who}`, figure: true,
+      drives, plays: `now${s.who}`, figure: true, asks: { who: t(WHO[s.who]) },
       panels: DELAYS.map(t_p => panel("c_error", "m", [
         ...s.tried.map((k_hg, i) => error(`tried${i}${t_p}`, i ? "" : t("before_line"), "faint")),
         error(`alone${t_p}`, t("alone"), "manual"), error(`now${t_p}`, t("now_line", { k_hg: s.k_hg.toFixed(2) }), "now")],
       { title: t("panel_driver", { who: t(WHO[t_p]), t_p: t_p.toFixed(1) }), least: 0.25, mine: t_p === s.who })),
       controls: [RESISTS, THREE],
+      right: r => nearer(peak(r.relies), peak(r.resists), ["relies", "same", "resists"]),
       says: r => {
-        const [now, alone] = [r[`now${s.who}`], r[`alone${s.who}`]];
-        return t("said_reliance", { k_hg: s.k_hg.toFixed(2), who: t(WHO[s.who]), now: f3(peak(now)), alone: f3(peak(alone)), effort: f3(effort(now)), alone_effort: f3(effort(alone)) });
+        const [now, alone] = [r[`now${s.who}`], r[`alone${s.who}`]], guidance = now.metrics.mean_abs_guidance_torque_nm;
+        const said = { k_hg: s.k_hg.toFixed(2), who: t(WHO[s.who]), now: f2(peak(now)), alone: f2(peak(alone)), effort: f2(effort(now)), alone_effort: f2(effort(alone)), guidance: f2(guidance),
+          through: f2(guidance * Math.max(0, 1 - s.k_hg)), percent: (100 * s.k_hg).toFixed(0), t_p: s.who.toFixed(1) };
+        return `${t("said_reliance", said)} ${t(s.k_hg < 0.05 ? "why_relies" : s.k_hg > 0.95 ? "why_resists" : "why_between", said)}`;
       },
     };
   },
   failure: (s, say) => {
-    const drives = {}, order = [s.who, ...DELAYS.filter(t_p => t_p !== s.who)];
-    for (const t_p of order) for (const [name, k_hg] of [["high", 0], ["mid", 0.5], ["low", 1]]) drives[name + t_p] = { t_p, ...onLine(k_hg), fail: "torque", at: s.at };
+    const drives = {}, order = [s.who, ...DELAYS.filter(t_p => t_p !== s.who)], kinds = [["high", 0], ["mid", 0.5], ["low", 1]];
+    for (const t_p of order) for (const [name, k_hg] of kinds) drives[name + t_p] = { t_p, ...onLine(k_hg), fail: "torque", at: s.at };
     drives[`none${s.who}`] = { t_p: s.who, ...onLine(0) };
+    for (const [name, k_hg] of kinds) drives[`all_${name}`] = { t_p: s.who, ...onLine(k_hg), sweep: name === "high" ? sweepOf("torque", "input") : sweepOf("torque") };
+    const swings = r => kinds.map(([name]) => [name, after(r[name + s.who])]).sort((a, b) => b[1] - a[1]);
     return {
-      drives, plays: `high${s.who}`, figure: true,
-      panels: DELAYS.map(t_p => panel("c_error", "m", ["high", "mid", "low"].map(name => error(name + t_p, t(name), name)),
+      drives, plays: `high${s.who}`, figure: true, asks: { who: t(WHO[s.who]), at: s.at.toFixed(1) },
+      panels: [...DELAYS.map(t_p => panel("c_error", "m", ["high", "mid", "low"].map(name => error(name + t_p, t(name), name)),
         { title: t("panel_driver", { who: t(WHO[t_p]), t_p: t_p.toFixed(1) }), least: 0.65, mine: t_p === s.who, handle: instantOf(s, say), marksOf: `high${t_p}` })),
+      everyInstant(s, say, [...kinds.map(([name]) => [`all_${name}`, "torque", t(name), name]), ["all_high", "input", t("high_handed"), "handed"]], { who: t(WHO[s.who]) })],
       controls: [INSTANT, THREE],
-      says: r => t("said_failure", { at: s.at.toFixed(1), t_p: s.who.toFixed(1), high: f3(after(r[`high${s.who}`])), mid: f3(after(r[`mid${s.who}`])),
-        low: f3(after(r[`low${s.who}`])), none: f3(peak(r[`none${s.who}`])) }),
+      right: r => { const all = swings(r); return all[0][1] - all.at(-1)[1] < LEAST ? "same" : all[0][0]; },
+      says: r => {
+        const all = swings(r), none = peak(r[`none${s.who}`]);
+        return [t("said_failure", { at: s.at.toFixed(1), t_p: s.who.toFixed(1), high: f2(after(r[`high${s.who}`])), mid: f2(after(r[`mid${s.who}`])), low: f2(after(r[`low${s.who}`])), none: f2(none) }),
+          t(all[0][1] - all.at(-1)[1] < LEAST ? "failure_alike" : `failure_${all[0][0]}`), r.all_high ? ofInstants(r.all_high.peaks, t("high_short")) : ""].join("\n").trim();
+      },
     };
   },
   handover: (s, say) => {
-    const driver = { t_p: s.who, ...onLine(s.k_hg) };
+    const driver = { t_p: s.who, ...onLine(s.k_hg) }, asks = { who: t(WHO[s.who]), at: s.at.toFixed(1), k_hg: s.k_hg.toFixed(2) };
+    const saved = r => ({ added: after(r.sudden) - after(r.none), saved: after(r.sudden) - after(r.handed) });
     return {
-      drives: { handed: { ...driver, fail: "input", at: s.at }, sudden: { ...driver, fail: "torque", at: s.at }, none: driver }, plays: "handed",
+      drives: { handed: { ...driver, fail: "input", at: s.at }, sudden: { ...driver, fail: "torque", at: s.at }, none: driver, all: { ...driver, sweep: sweepOf("torque", "input") } }, plays: "handed", asks,
       panels: [panel("c_error", "m", [error("none", t("no_failure"), "manual"), error("sudden", t("sudden"), "high"), error("handed", t("handed"), "low")], { least: 0.25, handle: instantOf(s, say), marksOf: "handed" }),
-        panel("c_guidance", "N.m", [{ drive: "none", channel: "guidance", name: t("no_failure"), kind: "manual" }, { drive: "sudden", channel: "guidance", name: t("sudden"), kind: "high" }, { drive: "handed", channel: "guidance", name: t("handed"), kind: "low" }], { marksOf: "handed" })],
+        panel("c_guidance", "N.m", [{ drive: "none", channel: "guidance", name: t("no_failure"), kind: "manual" }, { drive: "sudden", channel: "guidance", name: t("sudden"), kind: "high" }, { drive: "handed", channel: "guidance", name: t("handed"), kind: "low" }], { marksOf: "handed" }),
+        everyInstant(s, say, [["all", "torque", t("sudden"), "high"], ["all", "input", t("handed"), "low"]], { who: `${t(WHO[s.who])}, K_hg ${s.k_hg.toFixed(2)}` })],
       controls: [INSTANT, RESISTS, THREE],
-      says: r => t("said_handover", { at: s.at.toFixed(1), sudden: f3(after(r.sudden)), handed: f3(after(r.handed)), none: f3(peak(r.none)) }),
+      right: r => { const by = saved(r); return by.added < LEAST || by.saved < 0.1 * by.added ? "nothing" : by.saved > 0.5 * by.added ? "most" : "some"; },
+      says: r => {
+        const by = saved(r).saved, word = Math.abs(by) < LEAST ? "handover_same" : by > 0 ? "handover_better" : "handover_worse";
+        return [t("said_handover", { at: s.at.toFixed(1), sudden: f2(after(r.sudden)), handed: f2(after(r.handed)), none: f2(peak(r.none)) }), t(word, { by: f2(Math.abs(by)) }),
+          r.all ? ofInstants(r.all.peaks, t("high_this", { k_hg: s.k_hg.toFixed(2) })) : ""].join(" ").trim();
+      },
     };
   },
   probe: s => ({
-    drives: { now: { t_p: 0.3, ...onLine(s.k_hg), probe: true, remnant: 0.1, course: "bends" } }, plays: "now", whole: true, starts: 8, rate: 3, needle: s.k_hg,
-    panels: [panel("c_k_hg", "0 to 1", [{ truth: s.k_hg, name: t("truth"), kind: "manual" }, { drive: "now", channel: "k_hg", name: t("told"), kind: "now", band: "deviation" }], { y: [-0.1, 1.3] }),
+    drives: { now: { t_p: 0.3, ...onLine(s.k_hg), probe: true, remnant: 0.1, course: "bends" } }, plays: "now", whole: true, starts: 8, rate: 3, needle: s.k_hg, asks: { k_hg: s.k_hg.toFixed(2) },
+    panels: [panel("c_k_hg", "0 to 1", [{ truth: s.k_hg, name: t("truth"), kind: "manual" }, { drive: "now", channel: "k_hg", name: t("told"), kind: "now", band: "deviation" }], { y: [-0.1, 1.6] }),
+      panel("c_sure", "of K_hg", [{ drive: "now", channel: "deviation", name: t("sure_whole"), kind: "now" }, { drive: "now", channel: "k_hg", scale: result => result.arm_share, name: t("sure_arm"), kind: "manual" }], { y: [0, 0.6] }),
       panel("c_tremble", "N.m", [{ drive: "now", channel: "guidance", name: t("guidance_torque"), kind: "guidance" }, { drive: "now", channel: "driver", name: t("driver_torque"), kind: "driver" }], { x: [14, 18] })],
     controls: [{ ...RESISTS, label: "k_hg_true" }],
-    says: ({ now }) => Number.isFinite(now.now.k_hg) ? t("said_probe", { told: f2(now.now.k_hg), deviation: f2(now.now.deviation), truth: f2(s.k_hg) }) : t("said_probe_none"),
+    right: ({ now }) => Number.isFinite(now.now.k_hg) ? tellsOf(now.now) : "either",
+    says: ({ now: result }) => {
+      const { now, channels, arm_share } = result;
+      if (!Number.isFinite(now.k_hg)) return t("said_probe_none");
+      const heard = PHASES_S.map(at => [at, channels.k_hg[200 * at], channels.deviation[200 * at]]).filter(([, k_hg]) => Number.isFinite(k_hg));
+      const arm = arm_share * Math.abs(now.k_hg), noise = Math.max(0, now.deviation - arm);
+      const phases = heard.map(([at, k_hg, deviation]) => t("said_phase", { at, told: sure(k_hg, deviation) })).join(", ");
+      return [t("said_probe", { phases, told: sure(now.k_hg, now.deviation), truth: f2(s.k_hg) }), t(`tells_${tellsOf(now)}`),
+        t(arm > noise ? "sure_by_arm" : "sure_by_noise", { noise: f2(noise), arm: f2(arm) })].join(" ");
+    },
   }),
   compare: s => {
     const both = (channel, scale) => ["a", "b"].map(drive => ({ drive, channel, scale, name: drive.toUpperCase(), kind: drive }));
@@ -108,8 +165,9 @@ const STEPS = {
       controls: [choice("shown", [["a", "A"], ["b", "B"]]), ...of("a"), ...of("b")], numbers: true,
       says: ({ a, b }) => {
         const by = peak(b) - peak(a), effort_by = effort(b) - effort(a), word = x => t(x > 0 ? "more_word" : "less_word");
-        return Math.abs(by) < 0.0005 && Math.abs(effort_by) < 0.0005 ? t("said_compare_same", { a: f3(peak(a)) })
-          : t("said_compare", { a: f3(peak(a)), b: f3(peak(b)), error: f3(Math.abs(by)), error_word: word(by), effort: f3(Math.abs(effort_by)), effort_word: word(effort_by) });
+        return [Math.abs(by) < LEAST ? t("said_error_same", { a: f2(peak(a)), b: f2(peak(b)) }) : t("said_error", { a: f2(peak(a)), b: f2(peak(b)), by: f2(Math.abs(by)), word: word(by) }),
+          Math.abs(effort_by) < LEAST ? t("said_effort_same", { a: f2(effort(a)) }) : t("said_effort", { by: f2(Math.abs(effort_by)), word: word(effort_by) }),
+          s.a.remnant || s.b.remnant ? t("said_one_draw") : ""].join(" ").trim();
       },
     };
   },
@@ -118,7 +176,7 @@ const STEPS = {
     panels: [panel("c_error", "m", [error("ship", t("shipping"), "manual"), error("own", t("own"), "now")], { least: 0.15 }),
       panel("c_guidance", "N.m", [{ drive: "ship", channel: "guidance", name: t("shipping"), kind: "manual" }, { drive: "own", channel: "guidance", name: t("own"), kind: "guidance" }])],
     controls: [THREE],
-    says: ({ own, ship }) => t("said_law", { own: f3(peak(own)), ship: f3(peak(ship)), limited: (100 * (own.metrics.limited_time_share ?? 0)).toFixed(0),
+    says: ({ own, ship }) => t("said_law", { own: f2(peak(own)), ship: f2(peak(ship)), limited: (100 * (own.metrics.limited_time_share ?? 0)).toFixed(0),
       limits: [...new Set(own.channels.limit)].filter(limit => limit && limit !== NO_LIMIT).map(limit => LIMITS[limit]).join(", ") || t("none") }),
   }),
 };

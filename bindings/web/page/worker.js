@@ -22,11 +22,33 @@ function guarded(law) {
   };
 }
 
-async function run(job) {
+function begin(job) {
   odd = fault = null;
   const names = lab.laws();
   if (!["shipping", "own", ...names].includes(job.law)) throw new Error(`no law is called ${job.law}`);
   lab.begin(job.toml, { law: job.law === "own" ? names.length : names.indexOf(job.law) });
+}
+
+// What a failure costs at each of the instants, from one drive without any. Other drives go first: what was found is kept.
+async function sweep(job) {
+  begin(job);
+  const { from, to, every, lasts, kinds } = job.sweep;
+  job.peaks ??= { at: [], ...Object.fromEntries(kinds.map(kind => [kind, []])) };
+  let made = 0;
+  for (let at = from + every * job.peaks.at.length; at <= to; at += every) {
+    const wanted = Math.round(1000 * at) - made;
+    if (lab.play(wanted) < wanted) break;
+    made += wanted;
+    job.peaks.at.push(at);
+    for (const kind of kinds) job.peaks[kind].push(lab.peakIfLost(kind, lasts));
+    await new Promise(done => setTimeout(done));
+    if (jobs[0] !== job) return null;
+  }
+  return { key: job.key, peaks: job.peaks };
+}
+
+async function run(job) {
+  begin(job);
   for (let made = 0; made < job.steps && !fault;) {
     const wanted = Math.min(CHUNK, job.steps - made), did = lab.play(wanted);
     made += did;
@@ -35,7 +57,7 @@ async function run(job) {
     if (made % 20000 === 0) await new Promise(done => setTimeout(done));
     if (!jobs.includes(job)) return null;
   }
-  const result = { key: job.key, channels: {}, road: lab.road(2), now: lab.now(), metrics: lab.metrics(...job.window), odd, fault };
+  const result = { key: job.key, channels: {}, road: lab.road(2), now: lab.now(), metrics: lab.metrics(...job.window), arm_share: lab.armShare(), odd, fault };
   for (const name of Object.keys(CHANNEL)) result.channels[name] = lab.channel(name);
   if (job.csv) result.csv = lab.csv();
   return result;
@@ -47,10 +69,10 @@ async function work() {
   while (jobs.length) {
     const job = jobs[0];
     let result;
-    try { result = job.identify ? { key: job.key, found: lab.identify(job.csv, job.manual) } : await run(job); }
+    try { result = job.identify ? { key: job.key, found: lab.identify(job.csv, job.manual) } : job.sweep ? await sweep(job) : await run(job); }
     catch (error) { result = { key: job.key, wrong: error.message }; }
     if (result) postMessage(result, Object.values(result.channels ?? {}).map(values => values.buffer));
-    jobs = jobs.filter(other => other !== job);
+    if (result) jobs = jobs.filter(other => other !== job);
   }
   busy = false;
 }

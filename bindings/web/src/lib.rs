@@ -13,6 +13,7 @@ use haptic_sim::Action;
 use haptic_sim::action::WorldFaults;
 use haptic_sim::models::road::{Course, LaneChoice};
 use haptic_sim::participants::participants;
+use haptic_sim::scenario::FailureKind;
 use run::{NOW, Run};
 
 #[derive(Default)]
@@ -163,6 +164,26 @@ fn drive(steps: u32, action: &Action) -> u32 {
     run.as_mut().map_or(0, |run| {
         (0..steps).take_while(|_| run.step(action)).count() as u32
     })
+}
+
+/// The largest lateral error of the next seconds, m, if the lane (not 0) or the torque (0) is lost in the coming step;
+/// NaN without a run, or if something is lost already. The run itself goes on as it was.
+#[unsafe(no_mangle)]
+pub extern "C" fn peak_if_lost(lane: u32, lasts_s: f64) -> f64 {
+    let lost = if lane != 0 {
+        FailureKind::Input
+    } else {
+        FailureKind::Torque
+    };
+    let lab = lab();
+    let peak_m = lab.run.as_ref().and_then(|run| run.peak_if_m(lost, lasts_s));
+    peak_m.unwrap_or(f64::NAN)
+}
+
+/// The share of K_hg by which the ECU's estimate may be wrong because it does not know the driver's arm; NaN without a run.
+#[unsafe(no_mangle)]
+pub extern "C" fn arm_share() -> f64 {
+    lab().run.as_ref().map_or(f64::NAN, Run::arm_share)
 }
 
 /// Where the numbers of this instant stand.

@@ -1,17 +1,19 @@
 //! A run under way: its loop, its record, and what the page asks of them.
 
-use haptic_analysis::metrics::{Circumstances, Failure, Metrics, Window, measure};
+use haptic_analysis::metrics::{self, Circumstances, Metrics, Window, measure};
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
+use haptic_core::controller::config::arm_share;
 use haptic_log::trace::{CHANNELS, Sample, Trace};
 use haptic_sim::guidance::{AnyGuidance, Guidance, OwnLaw};
 use haptic_sim::input::InputError;
 use haptic_sim::kind::Make;
 use haptic_sim::laws::{LAWS, Law, LawView};
+use haptic_sim::models::STEPS_PER_SECOND;
 use haptic_sim::models::road::Course;
 use haptic_sim::parts::PaperPair;
-use haptic_sim::scenario::{Condition, FailureKind};
-use haptic_sim::simulation::{Ending, Outcome, SAMPLE_RATE_HZ};
+use haptic_sim::scenario::{Condition, Failure, FailureKind};
+use haptic_sim::simulation::{DIVERGED_M, Ending, Outcome, SAMPLE_RATE_HZ};
 use haptic_sim::{Action, Scenario, Simulation};
 
 use crate::LabResult;
@@ -90,6 +92,25 @@ impl Run {
         }
     }
 
+    /// The largest lateral error of the next seconds, m, if `lost` fails in the coming step; 10 m and more of a run that leaves
+    /// the road, `None` if something has failed before. The run itself goes on as it was.
+    pub(crate) fn peak_if_m(&self, lost: FailureKind, lasts_s: f64) -> Option<f64> {
+        let failure = Failure {
+            kind: lost,
+            time_s: 0.0,
+            duration_s: None,
+        };
+        match &self.simulation {
+            Loop::Shipping(simulation) => peak_of_fork_m(simulation, failure, lasts_s),
+            Loop::Law(simulation) => peak_of_fork_m(simulation, failure, lasts_s),
+        }
+    }
+
+    /// The share of K_hg by which the ECU's estimate may be wrong because it does not know the driver's arm.
+    pub(crate) fn arm_share(&self) -> f64 {
+        arm_share(&self.scenario.guidance().controller)
+    }
+
     /// What a run is judged by, as the command line has it: over a stretch of road, with its failure.
     pub(crate) fn metrics(&self, from_m: f64, to_m: f64) -> Metrics {
         let scenario = &self.scenario;
@@ -102,7 +123,7 @@ impl Run {
                 speed_m_s: scenario.speed_m_per_s(),
                 lane_width_m: scenario.course().lane_width_m(),
                 window: Some(Window { from_m, to_m }),
-                failure: (failure.kind != FailureKind::None).then_some(Failure {
+                failure: (failure.kind != FailureKind::None).then_some(metrics::Failure {
                     time_s: failure.time_s,
                     nominal_peak_lateral_error_m: None,
                 }),
@@ -199,6 +220,25 @@ impl Record {
         self.trace.write_csv(&mut csv)?;
         Ok(String::from_utf8(csv)?)
     }
+}
+
+fn peak_of_fork_m<G: Guidance + Clone>(trunk: &Simulation<G>, failure: Failure, lasts_s: f64) -> Option<f64> {
+    let steps_per_s = f64::from(STEPS_PER_SECOND);
+    let time_s = f64::from(trunk.steps()) / steps_per_s;
+    let mut fork = trunk.fork_at(Failure { time_s, ..failure })?;
+    let mut peak_m: f64 = 0.0;
+    for _ in 0..(lasts_s * steps_per_s) as u32 {
+        let Some(outcome) = fork.step(&Action::default()) else {
+            break;
+        };
+        if let Some(sample) = outcome.sample {
+            peak_m = peak_m.max(sample.lateral_error_m.abs());
+        }
+    }
+    Some(match fork.ending() {
+        Some(Ending::Diverged { .. }) => peak_m.max(DIVERGED_M),
+        _ => peak_m,
+    })
 }
 
 fn law_at(place: usize, scenario: &Scenario) -> LabResult<Box<dyn Law>> {

@@ -17,7 +17,7 @@
 //! | RMS error | 0.072 | 0.043 |
 //! | share within 1.96 deviations | 0.95 | 0.95 |
 //!
-//! (`host-sim reliance` makes this table; `tests/reliance.rs` asserts a part of it.)
+//! (`cargo xtask reliance` makes this table; `tests/reliance.rs` asserts a part of it.)
 //!
 //! K_nms and t_nms of the driver's arm are assumed. An arm with another t_nms, 0.06 to 0.15 s, causes an error in
 //! proportion to K_hg; the reported deviation is that of the noise plus the largest such error. So it is large for

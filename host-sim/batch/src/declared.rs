@@ -39,7 +39,8 @@ pub struct Listener {
     faults: FaultSet,
     /// Steps since guidance left; none while it is there.
     away: Option<u32>,
-    pub(crate) steps: u32,
+    /// Steps so far.
+    pub steps: u32,
     /// Lateral acceleration of the road, left positive.
     lateral_m_per_s2: f64,
 }
@@ -81,7 +82,7 @@ impl Listener {
     }
 
     /// What driver and host do next.
-    pub(crate) fn action(&self) -> Action {
+    pub fn action(&self) -> Action {
         Action {
             engage: Some(self.engages()),
             ..Action::default()
@@ -98,7 +99,8 @@ impl Listener {
         }
     }
 
-    pub(crate) fn observe(&mut self, outcome: &Outcome) {
+    /// Takes what came of a step.
+    pub fn observe(&mut self, outcome: &Outcome) {
         if let Some(sample) = outcome.sample {
             let v = sample.speed_m_per_s;
             self.lateral_m_per_s2 = sample.curvature_1pm * v * v;

@@ -127,7 +127,7 @@ pub fn identify_several(
 pub struct Drivers {
     /// Name of the drive and what was made of it.
     pub drivers: Vec<(String, Identification)>,
-    /// The first of two drivers less the second; empty otherwise.
+    /// Differences of two drivers, the first less the second; empty otherwise.
     pub differences: Vec<Difference>,
     /// What a group of three drivers or more is like; empty otherwise.
     pub population: Vec<Population>,

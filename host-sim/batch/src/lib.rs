@@ -9,7 +9,6 @@
 //! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
-//! - [`real_drives`]: recordings of real people, half against half.
 //! - [`run`]: one scenario.
 //! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
@@ -59,7 +58,6 @@ pub mod paper;
 mod parts;
 mod places;
 mod readings;
-pub mod real_drives;
 mod record;
 mod recorder;
 pub mod reliance;

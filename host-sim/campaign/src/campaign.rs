@@ -204,7 +204,7 @@ pub(super) fn result(
         cycle,
         what,
         replay: format!(
-            "host-sim faults --rows {} --seed {}{again}",
+            "cargo xtask faults --rows {} --seed {}{again}",
             row.name, outcome.seed
         ),
     };

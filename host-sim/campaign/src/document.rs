@@ -1,4 +1,4 @@
-//! The table of faults in words, which `host-sim faults --list` prints.
+//! The table of faults in words, which `cargo xtask faults --list` prints.
 
 use super::residual::Detectability;
 use super::table::{Expect, FaultCase, GROUPS};

@@ -19,7 +19,7 @@ pub(crate) const LANE_EDGE_M: f64 = 0.95;
 /// Most that a torque that nobody asked for may push a vehicle whose driver keeps the lane, m: a quarter of the way to the lane's edge.
 const PUSHED_M: f64 = 0.25;
 
-/// Remnant of those who keep the lane in a real car, N.m: that of `host-sim availability` on a motorway.
+/// Remnant of those who keep the lane in a real car, N.m: that of `cargo xtask availability` on a motorway.
 const REMNANT_SD_NM: f64 = 0.4;
 
 /// Who drives.
@@ -28,7 +28,7 @@ const REMNANT_SD_NM: f64 = 0.4;
 pub enum Drivers {
     /// The participants of tables 5 and 6 and the nine drivers of tables 7 and 8, for the paper's car.
     Paper,
-    /// The drivers of `host-sim availability`, for a real car.
+    /// The drivers of `cargo xtask availability`, for a real car.
     Population,
     /// The population with a reliance of 0.8 to 1 and without a remnant: nothing they do shows that the guidance is
     /// wrong.

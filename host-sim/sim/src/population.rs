@@ -2,7 +2,7 @@
 //!
 //! The paper's drivers hold the wheel so loosely (K_nms of 1 N.m/rad) that the friction of a column alone carries them metres
 //! aside at 120 km/h. Hands that steer hold it several times stiffer and answer sooner. So do these: with a remnant of 0.4 N.m
-//! they keep the lane as people do (`host-sim availability` prints their SDLP).
+//! they keep the lane as people do (`cargo xtask availability` prints their SDLP).
 
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;

@@ -14,7 +14,7 @@ use serde::de::DeserializeOwned;
 use super::{BadInput, in_file};
 
 /// A file of parts.
-pub(super) struct Checkpoint {
+pub struct Checkpoint {
     path: PathBuf,
     file: Mutex<File>,
 }
@@ -24,7 +24,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// Another study's file, or one that cannot be read or written.
-    pub(super) fn open<T: DeserializeOwned>(path: &Path, heading: &str) -> Result<(Self, Vec<T>), BadInput> {
+    pub fn open<T: DeserializeOwned>(path: &Path, heading: &str) -> Result<(Self, Vec<T>), BadInput> {
         let fail = |e: &dyn std::fmt::Display| in_file(path)(e);
         let text = match std::fs::read_to_string(path) {
             Ok(text) => text,
@@ -69,7 +69,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// What the file system says.
-    pub(super) fn add(&self, part: &impl Serialize) -> Result<(), String> {
+    pub fn add(&self, part: &impl Serialize) -> Result<(), String> {
         let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", self.path.display());
         let mut line = serde_json::to_string(part).map_err(|e| fail(&e))?;
         line.push('\n');

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::Options;
+use haptic_analysis::identify::{Options, WHEEL_INERTIA_KG_M2};
 use haptic_batch::identify::{Method, identify, identify_pieces, identify_several};
 use haptic_report::studies::identify::report;
 use haptic_sim::input::in_range;
@@ -33,13 +33,18 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
     /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms; by
-    /// how much a column is late, s: t_h_late, t_d_late); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
+    /// how much a column is late, s: t_h_late, t_d_late; the driver's own line, m: line_offset and line_bend, that in a left bend of
+    /// 300 m at 60 km/h; wheel_inertia); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
     /// Estimate what is otherwise taken as known: k_nms, t_nms, t_h_late, t_d_late, in a range if one is given, such as
     /// t_nms=0.06..0.15; may be repeated
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
+    /// The torque was measured by a torsion bar below a steering wheel of this inertia (0.03 to 0.05 is usual): the torque of the
+    /// hands is made of it before the fit. Without it driver_torque_nm is taken as the torque of the hands
+    #[arg(long, value_name = "KG_M2")]
+    wheel_inertia: Option<f64>,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
     no_lane_smoothing: bool,
@@ -65,6 +70,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let mut options = Options::given(arguments.manual, &arguments.fix)?;
     for what in &arguments.estimate {
         options.estimate(what)?;
+    }
+    if let Some(inertia) = arguments.wheel_inertia {
+        let [least, most] = WHEEL_INERTIA_KG_M2;
+        in_range("--wheel-inertia", inertia, least..=most, "kg.m2")?;
+        options.wheel_inertia = Some(inertia);
     }
     arguments.recording.reading.choose(&mut options)?;
     options.lane_noise = !arguments.no_lane_smoothing;

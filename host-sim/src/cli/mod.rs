@@ -4,11 +4,10 @@
 //! installed. Results go to stdout, all else (progress, where the files are, what is wrong) to stderr; with `--json`
 //! stdout holds one JSON object.
 //!
-//! One file per command; their groups in `--help` are in `names`. Not here: anything that a study or a model decides.
+//! What `haptic-evidence` needs too is public. One file per command; their groups in `--help` are in `names`. Not here: anything that a study or a model decides.
 
 mod adaptation;
-mod availability;
-mod checkpoint;
+pub mod checkpoint;
 mod compare;
 mod convert;
 mod course;
@@ -18,25 +17,20 @@ mod drivers;
 mod ecu;
 mod evaluate;
 mod experiment;
-mod faults;
-mod handover;
 mod identify;
 mod lab;
 mod names;
-mod output;
-mod participants;
-mod progress;
-mod real_drives;
-mod recording;
-mod reliance;
-mod results;
+pub mod output;
+pub mod participants;
+pub mod progress;
+pub mod recording;
+pub mod results;
 mod road;
 mod run;
 mod series;
 mod stability;
 mod study;
 mod sweep;
-mod validate;
 
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -46,6 +40,9 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use haptic_sim::input::did_you_mean;
 use serde::Serialize;
+
+pub use names::signed;
+pub use output::force;
 
 /// Closed-loop workbench for the haptic-guidance steering controller
 #[derive(Debug, Parser)]
@@ -64,6 +61,9 @@ command and its options.
 
 New here? The tutorial is docs/tutorials/first-evaluation.md;
 docs/glossary.md explains words and symbols.
+
+`cargo xtask --help` lists what the claims rest on: faults, availability,
+handover, reliance, validate and real-drives.
 
 Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or
 usage, or a program that is not installed.";
@@ -115,10 +115,6 @@ enum Command {
     ///
     /// What differs between two, what a group is like.
     Drivers(drivers::Arguments),
-    /// Recordings of real people: read or refused, half against half
-    ///
-    /// A driver that is fitted to one half of each drive predicts the other.
-    RealDrives(real_drives::Arguments),
     /// Which experiment tells a driver's parameters well enough
     ///
     /// Probe, course and length, for a given error.
@@ -127,30 +123,10 @@ enum Command {
     ///
     /// Each session leaves a recording that is never overwritten; the metrics come by condition.
     Study(study::Arguments),
-    /// How right the estimates of `identify` are
-    ///
-    /// On drivers with a known truth.
-    Validate(validate::Arguments),
     /// A recording in another format, or the list of its channels
     ///
     /// CSV, Parquet, MAT, MDF4, candump, ASC, BLF.
     Convert(convert::Arguments),
-    /// Every fault by name, every rule checked in every cycle
-    ///
-    /// In the closed loop.
-    Faults(faults::Arguments),
-    /// How often guidance leaves for nothing on real roads, by cause
-    ///
-    /// Many cars drive for hours.
-    Availability(availability::Arguments),
-    /// What a lost input costs, with a handover and without
-    ///
-    /// At every instant of bends, at 40 to 130 km/h.
-    Handover(handover::Arguments),
-    /// How well the ECU estimates K_hg while it drives
-    ///
-    /// K_hg says how much a driver relies on it.
-    Reliance(reliance::Arguments),
     /// The ECU itself and its bus: run, pil, live, parameters, bus
     ///
     /// In QEMU or on a board.
@@ -160,7 +136,8 @@ enum Command {
 
 /// How a command ended that could do its work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outcome {
+pub enum Outcome {
+    /// All is well.
     Good,
     /// A check or a comparison failed.
     Failed,
@@ -173,7 +150,7 @@ const INTERRUPTED: u8 = 130;
 
 /// Why a command could not do its work: a message for people.
 #[derive(Debug)]
-struct BadInput(String);
+pub struct BadInput(pub String);
 
 impl<E: Display> From<E> for BadInput {
     fn from(error: E) -> Self {
@@ -181,7 +158,8 @@ impl<E: Display> From<E> for BadInput {
     }
 }
 
-pub(crate) fn main() -> ExitCode {
+/// The program `host-sim`.
+pub fn main() -> ExitCode {
     let mut arguments: Vec<OsString> = std::env::args_os().collect();
     if arguments.len() == 1 {
         arguments.push("evaluate".into());
@@ -192,7 +170,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match parsed {
         Ok(cli) => {
             if cli.force {
-                output::force();
+                force();
             }
             run(&cli.command)
         }
@@ -201,6 +179,11 @@ pub(crate) fn main() -> ExitCode {
             None => error.exit(),
         },
     };
+    status(result)
+}
+
+/// How the program ends; what is wrong goes to stderr.
+pub fn status(result: Result<Outcome, BadInput>) -> ExitCode {
     match result {
         Ok(Outcome::Good) => ExitCode::SUCCESS,
         Ok(Outcome::Failed) => ExitCode::from(1),
@@ -226,15 +209,9 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Lab(arguments) => lab::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Drivers(arguments) => drivers::run(arguments),
-        Command::RealDrives(arguments) => real_drives::run(arguments),
         Command::Design(arguments) => design::run(arguments),
         Command::Study(arguments) => study::run(arguments),
-        Command::Validate(arguments) => validate::run(arguments),
         Command::Convert(arguments) => convert::run(arguments),
-        Command::Faults(arguments) => faults::run(arguments),
-        Command::Availability(arguments) => availability::run(arguments),
-        Command::Handover(arguments) => handover::run(arguments),
-        Command::Reliance(arguments) => reliance::run(arguments),
         Command::Ecu(command) => ecu::run(command),
     }
 }
@@ -245,7 +222,10 @@ fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
 }
 
 /// The values of the names, all if there is no name.
-fn chosen<T>(
+///
+/// # Errors
+/// A name that there is not.
+pub fn chosen<T>(
     option: &str,
     names: &[String],
     all: &'static [T],
@@ -276,14 +256,17 @@ fn print_notes(notes: &[String]) {
 }
 
 /// How long a line on stdout may be: the terminal's width, or where there is no terminal what `COLUMNS` says.
-fn width() -> Option<usize> {
+pub fn width() -> Option<usize> {
     let terminal = terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| width.0.into());
     let asked = || std::env::var("COLUMNS").ok()?.parse().ok();
     terminal.or_else(asked).filter(|width| *width > 0)
 }
 
 /// Text on stdout. A reader that has seen enough (`| head`) is no error.
-fn print(text: &str) -> Result<(), BadInput> {
+///
+/// # Errors
+/// Those of the stream.
+pub fn print(text: &str) -> Result<(), BadInput> {
     use std::io::{ErrorKind, Write};
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {

@@ -9,17 +9,13 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use super::Cli;
 
 /// The commands as `--help` lists them.
-const GROUPS: [(&str, &str); 5] = [
+const GROUPS: [(&str, &str); 4] = [
     ("The paper", "evaluate experiment"),
     (
         "Drive",
         "run sweep compare design-guidance adaptation course stability lab",
     ),
-    (
-        "People",
-        "identify drivers real-drives design study validate convert",
-    ),
-    ("The ECU in simulation", "faults availability handover reliance"),
+    ("People", "identify drivers design study convert"),
     ("The ECU on a bus", "ecu"),
 ];
 
@@ -38,11 +34,11 @@ pub(super) fn grouped(program: clap::Command) -> clap::Command {
     let _ = write!(help, "\n{header}Options:{header:#}\n{{options}}{{after-help}}");
     program
         .help_template(help)
-        .mut_subcommands(|command| with_signs(command).mut_subcommands(with_signs))
+        .mut_subcommands(|command| signed(command).mut_subcommands(signed))
 }
 
 /// A value may begin with a minus: what is wrong with it is its range.
-fn with_signs(command: clap::Command) -> clap::Command {
+pub fn signed(command: clap::Command) -> clap::Command {
     command.mut_args(|option| {
         let takes_values = option.get_action().takes_values();
         option.allow_negative_numbers(takes_values)

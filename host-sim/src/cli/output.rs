@@ -23,7 +23,10 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 static KEPT: OnceLock<String> = OnceLock::new();
 
 /// From now on an interrupt says that every part of the work under way which is done is kept there.
-pub(super) fn keeps(place: &Path, part: &str) -> Result<(), BadInput> {
+///
+/// # Errors
+/// Interrupts cannot be caught.
+pub fn keeps(place: &Path, part: &str) -> Result<(), BadInput> {
     KEPT.get_or_init(|| {
         let place = place.display();
         format!("{place} keeps every {part} that was done; the same command goes on from there.")
@@ -79,7 +82,7 @@ fn owner<'a>(command: &'a str, keeps: &'a [&'a str]) -> Owner<'a> {
 }
 
 /// From now on sets take the place of whatever is in their directory.
-pub(super) fn force() {
+pub fn force() {
     FORCE.store(true, Ordering::Relaxed);
 }
 

@@ -7,7 +7,10 @@ use haptic_sim::input::{RangeError, in_range};
 use haptic_sim::participants::participants;
 
 /// Refuses a probe that the ECU refuses, by the name of the option.
-pub(super) fn check_probe(option: &str, amplitude_nm: f64) -> Result<(), RangeError> {
+///
+/// # Errors
+/// Its amplitude and the range.
+pub fn check_probe(option: &str, amplitude_nm: f64) -> Result<(), RangeError> {
     let own = PARAMETERS
         .iter()
         .find(|parameter| parameter.name == "probe_amplitude_nm");
@@ -18,7 +21,7 @@ pub(super) fn check_probe(option: &str, amplitude_nm: f64) -> Result<(), RangeEr
 
 /// The drives of an experiment with participants.
 #[derive(Debug, Args)]
-pub(super) struct Drives {
+pub struct Drives {
     #[command(flatten)]
     participants: Participants,
     /// Amplitude of the probe in the guided drives, N.m (0: none). The probe is a small torque added to the guidance;
@@ -31,7 +34,11 @@ pub(super) struct Drives {
 }
 
 impl Drives {
-    pub(super) fn plan(&self) -> Result<ExperimentPlan, RangeError> {
+    /// What is asked for.
+    ///
+    /// # Errors
+    /// A probe that the ECU refuses.
+    pub fn plan(&self) -> Result<ExperimentPlan, RangeError> {
         check_probe("--probe", self.probe)?;
         Ok(ExperimentPlan {
             participants: self.participants.numbers(),
@@ -41,8 +48,9 @@ impl Drives {
     }
 }
 
+/// Which of the paper's participants drive.
 #[derive(Debug, Args)]
-pub(super) struct Participants {
+pub struct Participants {
     /// How many of the paper's participants drive, from the first on (1 to 14)
     #[arg(long, value_name = "N", value_parser = how_many, conflicts_with = "participant")]
     participants: Option<u32>,
@@ -53,7 +61,7 @@ pub(super) struct Participants {
 
 impl Participants {
     /// Their numbers, in the order given.
-    pub(super) fn numbers(&self) -> Vec<u32> {
+    pub fn numbers(&self) -> Vec<u32> {
         match self.participants {
             Some(count) => (1..=count).collect(),
             None => self.participant.0.clone(),

@@ -13,8 +13,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::BadInput;
 
+/// On how many threads.
 #[derive(Debug, Args)]
-pub(super) struct Threads {
+pub struct Threads {
     /// Threads; default: one a core
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(super) threads: Option<u32>,
@@ -22,13 +23,13 @@ pub(super) struct Threads {
 
 impl Threads {
     /// Does some work on them.
-    pub(super) fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, BadInput> {
+    pub fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, BadInput> {
         Ok(on_threads(self.threads, work)?)
     }
 }
 
 /// Does some work under a bar of `length` steps.
-pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {
+pub fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {
     let bar = bar(length, unit);
     let done = work(&|| bar.inc(1));
     bar.finish_and_clear();
@@ -36,7 +37,7 @@ pub(super) fn over<T>(length: u64, unit: &str, work: impl FnOnce(&(dyn Fn() + Sy
 }
 
 /// Does some work that tells a watch how far it is, under a bar of what it tells.
-pub(super) fn watched<T>(unit: &str, work: impl FnOnce(&Watch<'_>) -> T) -> T {
+pub fn watched<T>(unit: &str, work: impl FnOnce(&Watch<'_>) -> T) -> T {
     let bar = bar(0, unit);
     let hear = |progress: Progress| {
         bar.set_length(progress.all);
@@ -63,7 +64,7 @@ pub(super) fn of_log(log: BusLog) -> (BusLog, ProgressBar) {
 }
 
 /// A bar of `length` steps.
-pub(super) fn bar(length: u64, unit: &str) -> ProgressBar {
+pub fn bar(length: u64, unit: &str) -> ProgressBar {
     styled(length, &format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{elapsed}}"))
 }
 

@@ -22,7 +22,7 @@ type Names = Vec<(String, Term)>;
 
 /// How a recording is read.
 #[derive(Debug, Args)]
-pub(super) struct ReadingArguments {
+pub struct ReadingArguments {
     /// A channel of another name or unit, such as driver_torque_nm=TorsionBar, 'wheel_angle_rad=Steering [deg]' or
     /// wheel_angle_rad=Steering*0.0174533; without a unit or factor the file's own unit is converted; may be repeated
     #[arg(long, value_name = "NAME=CHANNEL")]
@@ -68,7 +68,7 @@ pub(super) struct RecordingArguments {
 
 impl ReadingArguments {
     /// Takes stretches and gaps into the options of a fit.
-    pub(super) fn choose(&self, options: &mut Options) -> Result<(), BadInput> {
+    pub fn choose(&self, options: &mut Options) -> Result<(), BadInput> {
         options.between(&self.from, &self.to)?;
         if let Some(max_gap) = self.max_gap()? {
             options.bridge_s = max_gap;
@@ -84,7 +84,7 @@ impl ReadingArguments {
     }
 
     /// The columns of a log that are called otherwise.
-    pub(super) fn maps(&self) -> Result<Vec<Mapping>, BadInput> {
+    pub fn maps(&self) -> Result<Vec<Mapping>, BadInput> {
         let time = self.time.iter().map(|time| ("--time", format!("time_s={time}")));
         let maps = self.map.iter().map(|map| ("--map", map.clone()));
         let parsed = time.chain(maps).map(|(option, map)| {
@@ -94,7 +94,11 @@ impl ReadingArguments {
         parsed.collect()
     }
 
-    pub(super) fn layout(&self) -> Result<Option<Layout>, BadInput> {
+    /// The layout that describes the recording.
+    ///
+    /// # Errors
+    /// A layout that there is not.
+    pub fn layout(&self) -> Result<Option<Layout>, BadInput> {
         Ok(self.layout.as_deref().map(Layout::named).transpose()?)
     }
 

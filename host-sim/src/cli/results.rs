@@ -14,11 +14,12 @@ use super::{BadInput, Outcome, print, print_json, print_notes, width};
 /// Help of `--out` where a study always leaves files.
 pub(super) const DEFAULT_OUT: &str = "Directory for figures, the results and a report";
 
+/// Where the results go, and as what they are printed.
 #[derive(Debug, Args)]
-pub(super) struct ResultArguments {
+pub struct ResultArguments {
     /// Directory for figures, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
-    pub(super) out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
     json: bool,
@@ -52,12 +53,15 @@ impl ResultArguments {
     }
 
     /// For a command, as it is typed. Its directory is checked before there is work behind it.
-    pub(super) fn begin(&self, command: &str) -> Result<Results<'_>, BadInput> {
+    pub fn begin(&self, command: &str) -> Result<Results<'_>, BadInput> {
         self.begin_beside(command, &[])
     }
 
-    /// Begins the results of a command that keeps files by other means too.
-    pub(super) fn begin_beside(&self, command: &str, keeps: &[&str]) -> Result<Results<'_>, BadInput> {
+    /// Begins the results, where the command keeps files by other means too.
+    ///
+    /// # Errors
+    /// A directory that cannot be written, or that holds files of somebody else.
+    pub fn begin_beside(&self, command: &str, keeps: &[&str]) -> Result<Results<'_>, BadInput> {
         let place = self.out.as_deref();
         let output = place.map(|place| Output::beside(place, command, keeps));
         Ok(Results {
@@ -77,7 +81,7 @@ impl ResultArguments {
 }
 
 /// Where the results of a study go.
-pub(super) struct Results<'a> {
+pub struct Results<'a> {
     arguments: &'a ResultArguments,
     output: Option<Output>,
     /// Name of the file with the results.
@@ -86,22 +90,17 @@ pub(super) struct Results<'a> {
 
 impl Results<'_> {
     /// Gives the file with the results another name.
-    pub(super) fn named(self, file: &'static str) -> Self {
+    pub fn named(self, file: &'static str) -> Self {
         Self { file, ..self }
     }
 
     /// Where a study writes what is neither results nor report, if files are wanted.
-    pub(super) fn place(&self) -> Option<&Path> {
+    pub fn place(&self) -> Option<&Path> {
         self.output.as_ref().map(Output::place)
     }
 
     /// Writes and prints the results with where they come from; the command has failed if a check did not hold.
-    pub(super) fn show(
-        self,
-        report: &Report,
-        results: &impl Serialize,
-        holds: bool,
-    ) -> Result<Outcome, BadInput> {
+    pub fn show(self, report: &Report, results: &impl Serialize, holds: bool) -> Result<Outcome, BadInput> {
         self.show_bare(report, &report.stamp(results), holds)
     }
 

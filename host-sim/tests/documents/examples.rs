@@ -19,12 +19,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::{documents, place, root, run};
+use crate::{EVIDENCE, built, program};
 
 /// What a reader waits for and a test does not.
 const SHORTER: [(&str, &str); 3] = [
     ("--seeds 20", "--seeds 1"),
     ("-- experiment --probe", "-- experiment --participant 3 --probe"),
-    ("-- reliance", "-- reliance --participant 3 --seeds 1"),
+    ("xtask reliance", "xtask reliance --participant 3 --seeds 1"),
 ];
 
 /// A fenced block: its first line without the backticks, and its text.
@@ -74,34 +75,18 @@ fn blocks(text: &str) -> Vec<Block> {
     blocks
 }
 
+/// Whether a line is for xtask itself, and not for the program of evidence behind it.
+fn is_of_xtask(line: &str) -> bool {
+    let command = line
+        .strip_prefix("cargo xtask ")
+        .and_then(|rest| rest.split(' ').next());
+    command.is_some_and(|command| !EVIDENCE.contains(&command))
+}
+
 /// Words of a command line; `>` and what follows it stay words.
 fn words(command: &str) -> Vec<&str> {
     let command = command.split(" # ").next().unwrap_or("");
     command.split_whitespace().collect()
-}
-
-/// Whether an example was built from the sources that are there. Cargo builds examples with all tests, beside the programs, but not
-/// with tests that are named.
-fn is_up_to_date(program: &Path) -> bool {
-    let changed = |path: &Path| path.metadata().and_then(|file| file.modified()).ok();
-    let built = changed(program);
-    let listed = std::fs::read_to_string(program.with_extension("d")).unwrap_or_default();
-    let sources = listed.split_once(": ").map_or("", |(_, sources)| sources);
-    !sources.is_empty()
-        && sources.split_whitespace().all(|source| {
-            let source = changed(Path::new(source));
-            source.is_some() && source <= built
-        })
-}
-
-fn build_example(name: &str) {
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "-p", "host-sim", "--example", name]);
-    if !cfg!(debug_assertions) {
-        cargo.arg("--release");
-    }
-    let (code, _, err) = run(&mut cargo, &root(), name);
-    assert_eq!(code, Some(0), "{name}: {err}");
 }
 
 /// Runs one line of an `sh` block; what it printed.
@@ -125,16 +110,13 @@ fn run_line(line: &str, block: &Block, place: &Path, at: &str) -> String {
             "--example",
             example,
         ] => {
-            let programs = Path::new(env!("CARGO_BIN_EXE_host-sim")).parent().unwrap();
-            let program = programs.join("examples").join(example);
-            if !is_up_to_date(&program) {
-                build_example(example);
-            }
+            let place_of = Path::new("examples").join(example);
+            let program = built(&place_of, &["-p", "host-sim", "--example", example]);
             run(&mut Command::new(program), place, &at)
         }
-        ["cargo", "run", "--release", rest @ ..] => {
+        ["cargo", "run", "--release", rest @ ..] | ["cargo", "xtask", rest @ ..] => {
             let arguments = rest.strip_prefix(&["--"]).unwrap_or(rest);
-            let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+            let mut program = program(arguments.first().copied());
             if block.has("hardware") {
                 let known = knows(arguments, &mut program, place, &at);
                 assert!(known, "{at}: an option is not known");
@@ -257,7 +239,7 @@ fn run_examples(name: &Path, text: &str) {
                 for line in block.text.lines().filter(|line| !words(line).is_empty()) {
                     if block.has("setup") {
                         continue;
-                    } else if block.has("cargo") || line.starts_with("cargo xtask") {
+                    } else if block.has("cargo") || is_of_xtask(line) {
                         exists(line, &at);
                     } else {
                         let text = run_line(line, &block, place.path(), &at);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates whose README is checked; the bindings' are checked by their own tools.
-const CRATES: [&str; 14] = [
+const CRATES: [&str; 15] = [
     "core",
     "firmware",
     "firmware/lockstep",
@@ -22,6 +22,7 @@ const CRATES: [&str; 14] = [
     "host-sim/analysis",
     "host-sim/batch",
     "host-sim/campaign",
+    "host-sim/evidence",
     "host-sim/pil",
     "host-sim/report",
     "xtask",

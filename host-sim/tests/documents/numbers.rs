@@ -5,11 +5,11 @@ use std::path::Path;
 use std::process::Command;
 
 use super::{documents, place, root, run};
+use crate::{EVIDENCE, program};
 
 /// What `--help` of a command lists: the commands below each heading that is indented by nothing.
-fn listed(arguments: &[&str]) -> Vec<(String, Vec<String>)> {
+fn listed(mut program: Command, arguments: &[&str]) -> Vec<(String, Vec<String>)> {
     let place = place();
-    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"));
     let (_, help, _) = run(program.args(arguments).arg("--help"), place.path(), "--help");
     let mut groups: Vec<(String, Vec<String>)> = Vec::new();
     for line in help.lines() {
@@ -24,18 +24,21 @@ fn listed(arguments: &[&str]) -> Vec<(String, Vec<String>)> {
     groups
 }
 
-/// Every command of the program has its row in the reference, below the heading that `--help` has.
+/// Every command of both programs has its row in the reference, below the heading that `--help` has.
 #[test]
 fn the_reference_names_every_command() {
     let reference = std::fs::read_to_string(root().join("docs/reference/commands.md")).unwrap();
-    let groups = listed(&[]);
+    let mut groups = listed(program(None), &[]);
     assert!(groups.len() > 3, "{groups:?}");
+    let evidence = listed(program(Some(EVIDENCE[0])), &[]).remove(0).1;
+    assert_eq!(evidence, EVIDENCE);
+    groups.push(("Evidence".into(), evidence));
     for (title, names) in groups {
         let part = reference.split(&format!("\n### {title}\n")).nth(1);
         let part = part.unwrap_or_else(|| panic!("docs/reference/commands.md: no heading {title}"));
         let part = part.split("\n#").next().unwrap();
         let below = match names.iter().any(|name| name == "ecu") {
-            true => listed(&["ecu"]).remove(0).1,
+            true => listed(program(None), &["ecu"]).remove(0).1,
             false => Vec::new(),
         };
         let below = below.iter().map(|name| format!("ecu {name}"));

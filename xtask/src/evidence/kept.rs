@@ -64,7 +64,7 @@ pub(super) struct Sums {
     pub(super) share_limit: Option<f64>,
 }
 
-/// A row, as `host-sim faults --json` has it.
+/// A row, as `cargo xtask faults --json` has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Row {
     pub(super) name: String,
@@ -102,7 +102,7 @@ pub(super) struct Failure {
     pub(super) what: String,
 }
 
-/// A world on a road, or on all of them, as `host-sim availability --json` has it.
+/// A world on a road, or on all of them, as `cargo xtask availability --json` has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Cell {
     pub(super) world: String,

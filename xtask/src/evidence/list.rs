@@ -26,7 +26,7 @@ pub(super) struct List {
 pub(super) struct Measurement {
     /// What tables call it.
     pub(super) title: String,
-    /// Arguments of host-sim, without those that follow from rule and seeds.
+    /// Arguments of the program, without those that follow from rule and seeds.
     pub(super) command: String,
     /// When it ends.
     pub(super) rule: Rule,
@@ -177,7 +177,7 @@ impl List {
 }
 
 impl Measurement {
-    /// Arguments of host-sim with so many seeds or hours.
+    /// Arguments of the program with so many seeds or hours.
     pub(super) fn arguments(&self, count: Rule, first: u64) -> String {
         let command = &self.command;
         match count {

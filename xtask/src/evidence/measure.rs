@@ -1,4 +1,4 @@
-//! Making a measurement: host-sim's commands, in parts that an interruption leaves behind.
+//! Making a measurement: the program of evidence, in parts that an interruption leaves behind.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -30,6 +30,9 @@ impl Asked<'_> {
     }
 }
 
+/// How a person starts the program.
+pub(super) const PROGRAM: &str = "cargo xtask";
+
 /// Rows of the campaign that run at once: what an interruption costs at most.
 const AT_ONCE: usize = 16;
 
@@ -58,7 +61,7 @@ pub(super) fn all(list: &List, names: &[String], asked: &Asked) -> Result<()> {
     for (name, measurement) in wanted() {
         earlier(list, name, measurement, asked)?;
     }
-    let program = Built::ToShip.host_sim()?;
+    let program = Built::ToShip.evidence()?;
     for (number, (name, measurement)) in (1..).zip(wanted()) {
         println!("== {name} ({number} of {})", names.len());
         let earlier = earlier(list, name, measurement, asked)?;
@@ -80,7 +83,7 @@ pub(super) fn all(list: &List, names: &[String], asked: &Asked) -> Result<()> {
         );
         let date = output(command("git").args(["show", "-s", "--format=%cs", &commit]))?;
         let origin = Origin {
-            command: format!("host-sim {}", run.arguments),
+            command: format!("{PROGRAM} {}", run.arguments),
             commit: commit.clone(),
             date: date.trim().into(),
             rule: measurement.rule,
@@ -186,7 +189,7 @@ struct Run<'a> {
     parts: PathBuf,
 }
 
-/// What `host-sim --json` says beside its numbers.
+/// What `--json` says beside its numbers.
 #[derive(Deserialize)]
 struct Provenance {
     commit: String,
@@ -217,7 +220,7 @@ impl Run<'_> {
     fn campaign(&self, measurement: &Measurement) -> Result<Campaign> {
         let table = output(command(&self.program.to_string_lossy()).args(["faults", "--list"]))?;
         let names = rows_of(&table, self.arguments.contains("--target"));
-        ensure!(!names.is_empty(), "host-sim faults --list has no rows");
+        ensure!(!names.is_empty(), "{PROGRAM} faults --list has no rows");
         let (mut rows, mut limit) = (Vec::new(), None);
         for (k, some) in names.chunks(AT_ONCE).enumerate() {
             println!(
@@ -227,7 +230,7 @@ impl Run<'_> {
                 names.len()
             );
             let text = self.part(&format!("{k}.json"), &["--rows", &some.join(",")])?;
-            let part: Part = serde_json::from_str(&text).context("host-sim faults --json")?;
+            let part: Part = serde_json::from_str(&text).context("cargo xtask faults --json")?;
             self.is_of_commit(&part.provenance)?;
             rows.extend(part.rows);
             limit = part.limits.left_lane;
@@ -239,7 +242,7 @@ impl Run<'_> {
     fn availability(&self) -> Result<Vec<Cell>> {
         let drives = self.parts.join("drives.jsonl");
         let text = self.part("all.json", &["--checkpoint", &drives.to_string_lossy()])?;
-        let drives: Drives = serde_json::from_str(&text).context("host-sim availability --json")?;
+        let drives: Drives = serde_json::from_str(&text).context("cargo xtask availability --json")?;
         self.is_of_commit(&drives.provenance)?;
         Ok(drives.cells.into_iter().chain(drives.together).collect())
     }
@@ -258,7 +261,7 @@ impl Run<'_> {
         // 1: something failed, which is a result.
         ensure!(
             matches!(said.status.code(), Some(0 | 1)),
-            "host-sim {}: {}",
+            "{PROGRAM} {}: {}",
             self.arguments,
             said.status
         );
@@ -273,7 +276,7 @@ impl Run<'_> {
         let built = provenance.commit.trim_end_matches("-dirty");
         ensure!(
             self.commit.starts_with(built),
-            "host-sim was built from {built}, not from {}",
+            "the program was built from {built}, not from {}",
             self.commit
         );
         Ok(())

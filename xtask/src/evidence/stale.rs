@@ -6,6 +6,7 @@ use anyhow::Result;
 
 use super::kept::Kept;
 use super::list::{Measurement, Rule};
+use super::measure::PROGRAM;
 use crate::tool::{command, output, root};
 
 pub(super) enum State {
@@ -62,7 +63,11 @@ pub(super) fn state(measurement: &Measurement, kept: Option<&Kept>) -> Result<St
         return Ok(State::Unknown(commit));
     }
     let command = measurement.arguments(origin.count, origin.first_seed);
-    if origin.command != format!("host-sim {command}") {
+    // Earlier ones were made by a command of host-sim.
+    let kept = ["host-sim", PROGRAM]
+        .iter()
+        .find_map(|program| origin.command.strip_prefix(program));
+    if kept.map(str::trim_start) != Some(&command) {
         return Ok(State::Differs("command"));
     }
     if origin.rule != measurement.rule {

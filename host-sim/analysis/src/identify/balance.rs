@@ -6,8 +6,12 @@
 //! low-pass. S other than 1 is a scale, S below 0 a sign, and what the derivatives of T_d and T_h explain beside it a
 //! delay: `T_d(t + d) = T_d + d T_d'`. Shifts are taken out and the regression repeated until none is left.
 //!
+//! Dry friction `F sign(phi')` is one more regressor. While the wheel sticks, friction is whatever holds it, up to F, and
+//! the motion tells nothing of the torques. So where there is friction, only the rows count in which the wheel slides for
+//! as long as the low-pass remembers.
+//!
 //! What it cannot see: a scale that T_d and T_h share, a delay that all three share, and the camera. A column
-//! that does not answer so (friction, a servo that is not in T_h) leaves much unexplained; then nothing is said. Nor is
+//! that does not answer so (a servo that is not in T_h) leaves much unexplained; then nothing is said. Nor is
 //! anything where the speed changes: the vehicle's answer is one at one speed.
 
 use std::ops::Range;
@@ -15,7 +19,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::log::{DriveLog, SWITCH_RATE_NM_S};
+use super::log::DriveLog;
+use super::switches::Switches;
 use super::wide::{add_times, dot};
 
 /// Time constant of each stage of the low-pass, s.
@@ -28,6 +33,17 @@ const SETTLE_S: f64 = 1.5;
 const BLOCK_S: f64 = 1.5;
 /// Rounds of shifting.
 const ROUNDS: usize = 4;
+/// Time constant of the smoother that the wheel's rate is taken behind, s, and the rate at which friction has two thirds of
+/// its value, rad/s: slower is lost in the steps of the angle's sensor.
+const RATE_S: f64 = 0.02;
+const SLIDES_RAD_S: f64 = 0.01;
+/// Share of the low-pass's memory in which the wheel has to slide for a row to count beside friction.
+const SLIDING: f64 = 0.75;
+/// Standard errors, and N.m, beyond which there is friction.
+const FRICTION_SURE: f64 = 5.0;
+const FRICTION_NM: f64 = 0.02;
+/// Fewest seconds of sliding that say something of the sensors.
+const FEWEST_SLIDING_S: f64 = 15.0;
 
 /// What the balance of torques says of the sensors.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -44,6 +60,11 @@ pub struct Balance {
     pub between_s: Option<[f64; 2]>,
     /// Torque per angle at slow motion, and its standard error, N.m/rad: positive, or a sign is wrong.
     pub stiffness: [f64; 2],
+    /// Dry friction of the column, and its standard error, N.m; none where there is none to be seen. The rest is then of the
+    /// rows in which the wheel slides.
+    pub friction_nm: Option<[f64; 2]>,
+    /// Seconds that all this rests on.
+    pub seconds: f64,
 }
 
 /// A signal and its derivatives through the low-pass.
@@ -99,17 +120,39 @@ fn lagged(u: &[f64], dt: f64, t: f64) -> Vec<f64> {
         .collect()
 }
 
-/// T_h with its switches half a row later: the old value was held up to the row of the new one, where the signals that are
-/// continuous are on the line between.
-fn held(torque: &[f64], dt: f64) -> Vec<f64> {
-    let mut out = torque.to_vec();
-    for k in 1..torque.len() {
-        let rise = torque[k] - torque[k - 1];
-        if rise.abs() > SWITCH_RATE_NM_S * dt {
-            out[k] -= 0.5 * rise;
+/// T_h for lines between its rows: a switch is put where it was, not half a row before its row.
+fn held(log: &DriveLog) -> Vec<f64> {
+    let switches = Switches::of(log);
+    let mut out = log.guidance_torque_nm.clone();
+    for k in 1..out.len() {
+        let rise = switches.steps[k] - switches.steps[k - 1];
+        if rise != 0.0 {
+            out[k] -= rise * (0.5 - switches.before_row_s(k, log.dt_s) / log.dt_s);
         }
     }
     out
+}
+
+/// Which way the wheel turns, between -1 and 1 where it hardly does.
+fn turning(phi: &[f64], dt: f64) -> Vec<f64> {
+    let share = 1.0 - (-dt / RATE_S).exp();
+    let mut smooth = phi.to_vec();
+    let mut y = phi.first().copied().unwrap_or(0.0);
+    let mut pass = |x: &mut f64| {
+        y += share * (*x - y);
+        *x = y;
+    };
+    smooth.iter_mut().for_each(&mut pass);
+    // Backwards too, so that nothing is late.
+    smooth.iter_mut().rev().for_each(pass);
+    let last = smooth.len() - 1;
+    (0..=last)
+        .map(|k| {
+            let (before, after) = (k.saturating_sub(1), (k + 1).min(last));
+            let rate = (smooth[after] - smooth[before]) / ((after - before).max(1) as f64 * dt);
+            rate / rate.hypot(SLIDES_RAD_S)
+        })
+        .collect()
 }
 
 /// Weighs the torques of `log` over the `stretches`; none if there is too little of them.
@@ -117,38 +160,62 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
     if log.changes_speed() {
         return None;
     }
-    let dt = log.dt_s;
-    let settle = (SETTLE_S / dt) as usize;
+    let settle = (SETTLE_S / log.dt_s) as usize;
     let rows: Vec<usize> = stretches
         .iter()
         .flat_map(|s| s.start + settle..s.end.max(s.start + settle))
         .collect();
-    let guided = !manual && rows.iter().any(|&k| log.guidance_torque_nm[k] != 0.0);
     if rows.len() < 10 * settle.min(120) {
         return None;
     }
-    let held = held(&log.guidance_torque_nm, dt);
+    let turning = turning(&log.wheel_angle_rad, log.dt_s);
+    let all = weighed(log, &rows, manual, &turning)?;
+    let sure = |[value, error]: &[f64; 2]| *value > (FRICTION_SURE * error).max(FRICTION_NM);
+    if all.friction_nm.filter(sure).is_none() {
+        return Some(Balance {
+            friction_nm: None,
+            ..all
+        });
+    }
+    let amount: Vec<f64> = turning.iter().map(|t| t.abs()).collect();
+    let sliding = pass(&amount, log.dt_s, 0.0).value;
+    let rows: Vec<usize> = rows.into_iter().filter(|&k| sliding[k] > SLIDING).collect();
+    if (rows.len() as f64) * log.dt_s < FEWEST_SLIDING_S {
+        return Some(Balance {
+            explained: 0.0,
+            ..all
+        });
+    }
+    weighed(log, &rows, manual, &turning)
+}
+
+/// The balance over `rows`.
+fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Option<Balance> {
+    let dt = log.dt_s;
+    let guided = !manual && rows.iter().any(|&k| log.guidance_torque_nm[k] != 0.0);
+    let held = held(log);
     let phi = pass(&log.wheel_angle_rad, dt, 0.0);
     let mut columns = Columns::default();
     for column in [&phi.acceleration, &phi.rate, &phi.value] {
-        columns.push(column, &rows);
+        columns.push(column, rows);
     }
     for t in VEHICLE_LAGS_S {
-        columns.push(&lagged(&phi.value, dt, t), &rows);
+        columns.push(&lagged(&phi.value, dt, t), rows);
     }
     let stiff = 2..columns.scale.len();
-    columns.push(&vec![1.0; log.len()], &rows);
+    columns.push(&vec![1.0; log.len()], rows);
+    columns.push(&pass(turning, dt, 0.0).value, rows);
     let first_of_torques = columns.scale.len();
     let (mut driver_late, mut guidance_late) = (0.0_f64, 0.0_f64);
     let mut found = None;
     for _ in 0..ROUNDS {
         let driver = pass(&log.driver_torque_nm, dt, driver_late);
         columns.truncate(first_of_torques);
-        columns.push(&driver.rate, &rows);
+        columns.push(&driver.rate, rows);
         if guided {
             let guidance = pass(&held, dt, guidance_late);
-            columns.push(&guidance.value, &rows);
-            columns.push(&guidance.rate, &rows);
+            columns.push(&guidance.value, rows);
+            columns.push(&guidance.rate, rows);
         }
         let torque: Vec<f64> = rows.iter().map(|&k| driver.value[k]).collect();
         let fit = regress(&torque, &mut columns, (BLOCK_S / dt) as usize)?;
@@ -185,6 +252,8 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
             guidance_late_s: late,
             between_s: between,
             stiffness: [stiffness, variance.max(0.0).sqrt()],
+            friction_nm: Some([fit.weights[d - 1], error(d - 1)]),
+            seconds: rows.len() as f64 * dt,
         });
         if driver_late.abs() > 0.3 || guidance_late.abs() > 0.3 || (step.abs() < 5e-4 && more.abs() < 5e-4) {
             break;

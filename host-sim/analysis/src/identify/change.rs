@@ -11,6 +11,32 @@ pub(crate) const E_Y: &str = "e_y_m";
 /// Shortest piece between two changes that is fitted, s.
 pub(crate) const SHORTEST_S: f64 = 10.0;
 
+/// How a change goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shape {
+    /// At one instant, and it stays.
+    Step,
+    /// From the first instant to the last one, and it stays.
+    Drift,
+    /// From the first instant to the last one only.
+    Blip,
+}
+
+/// The least change of a parameter that a record would show in nine of ten drives.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Power {
+    /// Key of what changes, as in [`Change`].
+    pub parameter: &'static str,
+    /// A step in the middle of the record; none if no step is seen.
+    pub step: Option<f64>,
+    /// A change for [`BLIP_S`] that then goes back; none if none is seen.
+    pub blip: Option<f64>,
+}
+
+/// Length of the blip that the power is told of, s.
+pub const BLIP_S: f64 = 8.0;
+
 /// How constant the driver of a record was.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Constancy {
@@ -19,29 +45,47 @@ pub struct Constancy {
     pub deviance: f64,
     /// What that has to exceed before the driver is said to have changed.
     pub level: f64,
+    /// What the test would see.
+    pub power: Vec<Power>,
     /// The likeliest change, if it exceeds the level and is large enough to matter.
     pub change: Option<Change>,
+}
+
+impl Constancy {
+    /// By how much the likeliest change is beyond its level.
+    pub(crate) fn beyond(&self) -> f64 {
+        self.deviance - self.level
+    }
 }
 
 /// A change of the driver.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
-    /// Key of what changed: k_hg, k_d (all gains by one factor) or t_p; driver_torque_nm or e_y_m for the offset of a sensor.
+    /// Key of what changed: k_hg, k_d (all gains by one factor) or t_p; driver_torque_nm for the offset of that sensor; e_y_m
+    /// for the driver's line or the offset of that sensor.
     pub parameter: &'static str,
+    /// How it goes on.
+    pub shape: Shape,
     /// First and last instant of the change, s: the same for a step.
     pub at_s: [f64; 2],
     /// 95 % intervals of these instants, s.
     pub at_95_s: [[f64; 2]; 2],
-    /// By how much; of k_d the share of the gains, of e_y_m the slope that it makes of the torque, N.m/s.
+    /// By how much; of k_d the share of the gains, of e_y_m (the driver's line or the camera's offset, which no log tells apart)
+    /// the slope that it makes of the torque, N.m/s.
     pub by: f64,
     /// What the change adds to twice the log likelihood.
     pub deviance: f64,
 }
 
 impl Change {
-    /// Whether it took longer than the record can tell from a step.
-    pub fn is_drift(&self) -> bool {
-        self.at_s[1] > self.at_s[0]
+    /// When it was, in words.
+    pub(crate) fn when(&self) -> String {
+        let [from, to] = self.at_s;
+        match self.shape {
+            Shape::Step => format!("at {from:.0} s"),
+            Shape::Drift => format!("from {from:.0} to {to:.0} s"),
+            Shape::Blip => format!("between {from:.0} and {to:.0} s"),
+        }
     }
 
     /// The time in which the driver is neither the one before nor the one after, s.
@@ -55,23 +99,23 @@ impl fmt::Display for Change {
         let name = match self.parameter {
             "k_d" => "k_d (all gains)",
             T_D => "the offset of driver_torque_nm",
-            E_Y => "the slope of driver_torque_nm",
+            E_Y => "the driver's line, or the offset of e_y_m,",
             name => name,
         };
         let by = match self.parameter {
             "k_d" => format!("{:+.0} %", 100.0 * self.by),
             "t_p" => format!("{:+.3} s", self.by),
             T_D => format!("{:+.3} N.m", self.by),
-            E_Y => format!("{:+.4} N.m/s", self.by),
+            E_Y => format!("what makes {:+.4} N.m/s of the driver's integral", self.by),
             _ => format!("{:+.2}", self.by),
         };
-        let [from, to] = self.at_s;
         let [[first, _], [_, last]] = self.at_95_s;
-        if self.is_drift() {
-            write!(f, "{name} drifted by {by} from {from:.0} to {to:.0} s")?;
-        } else {
-            write!(f, "{name} changed by {by} at {from:.0} s")?;
-        }
+        let verb = match self.shape {
+            Shape::Step => "changed",
+            Shape::Drift => "drifted",
+            Shape::Blip => "differed",
+        };
+        write!(f, "{name} {verb} by {by} {}", self.when())?;
         write!(f, " ({first:.0} to {last:.0} s, 95 %)")
     }
 }

@@ -16,6 +16,7 @@ mod diagnostics;
 mod drivers;
 mod lane;
 mod log;
+mod motion;
 mod noise_model;
 mod options;
 mod paper;
@@ -23,16 +24,19 @@ mod pieces;
 mod prepare;
 mod recording;
 mod result;
+mod road;
 mod search;
 mod signals;
+mod switches;
 mod together;
 mod tracking;
 mod verdict;
+mod wheel;
 mod wide;
 
 pub use balance::Balance;
 pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack};
-pub use change::{Change, Constancy};
+pub use change::{BLIP_S, Change, Constancy, Power, Shape};
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use drivers::{Difference, Population, differences, population, value_and_error};
 pub use lane::LaneNoise;
@@ -40,15 +44,15 @@ pub use log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 pub use noise_model::{
     INFORMED, Information, LONGEST_DELAY_S, Truth, identify as identify_with_noise_model, information,
 };
-pub use options::{FixError, Options};
+pub use options::{FixError, Options, WHEEL_INERTIA_KG_M2};
 pub use paper::{TABLE_4, identify as identify_as_published};
 pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use recording::{Layout, Mapping, Signals, Table, of_bytes, of_table, open as open_mapped};
 pub use result::Refutation;
 pub use result::{
-    AtTNms, Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant,
-    Start, Traces, Whiteness,
+    AtTNms, Combination, Correlation, Identification, InputCorrelation, OwnLine, Parameter, Parameters,
+    Remnant, Start, Traces, Whiteness,
 };
 pub use search::Termination;
 pub use signals::Muscle;

@@ -1,5 +1,6 @@
 //! What the caller knows already: parameters given instead of estimated (`--fix NAME=VALUE`).
 
+use super::noise_model::BEND_RAD_S;
 use super::signals::Muscle;
 
 /// Why a `NAME=VALUE` was refused.
@@ -16,6 +17,12 @@ pub struct Options {
     pub muscle: Muscle,
     /// Whether t_nms is known exactly: otherwise it is freed where the record draws it away.
     pub t_nms_known: bool,
+    /// Whether K_nms is known exactly, likewise.
+    pub k_nms_known: bool,
+    /// Known offset of the driver's own line, m, and its part in bends, m by rad/s of the road's turn.
+    pub line: [Option<f64>; 2],
+    /// Inertia of the wheel above a torsion bar that measured T_d, kg.m2; none where T_d is the torque of the hands.
+    pub wheel_inertia: Option<f64>,
     /// Known a_1, a_2, a_3.
     pub a: [Option<f64>; 3],
     /// Known (K_d + K_nms)*a_i.
@@ -52,6 +59,9 @@ impl Default for Options {
             manual: false,
             muscle: Muscle::default(),
             t_nms_known: false,
+            k_nms_known: false,
+            line: [None; 2],
+            wheel_inertia: None,
             a: [None; 3],
             gain: [None; 3],
             t_p_s: None,
@@ -68,8 +78,11 @@ impl Default for Options {
     }
 }
 
+/// Inertia that a steering wheel may have, kg.m2.
+pub const WHEEL_INERTIA_KG_M2: [f64; 2] = [0.0, 0.2];
+
 /// Names that can be fixed, with the range of each.
-const FIXABLE: [(&str, f64, f64); 13] = [
+const FIXABLE: [(&str, f64, f64); 16] = [
     ("a_1", 1e-4, 10.0),
     ("a_2", 1e-4, 10.0),
     ("a_3", 1e-4, 100.0),
@@ -84,6 +97,9 @@ const FIXABLE: [(&str, f64, f64); 13] = [
     ("t_nms", 0.01, 1.0),
     ("t_h_late", -0.1, 0.3),
     ("t_d_late", -0.1, 0.3),
+    ("line_offset", -1.5, 1.5),
+    ("line_bend", -1.5, 1.5),
+    ("wheel_inertia", WHEEL_INERTIA_KG_M2[0], WHEEL_INERTIA_KG_M2[1]),
 ];
 
 /// Names that are known unless they are to be estimated, with the range in which they are then searched.
@@ -159,7 +175,10 @@ impl Options {
             "t_p" => self.t_p_s = Some(value),
             "k_d" => self.k_d = Some(value),
             "k_hg" => self.k_hg = Some(value),
-            "k_nms" => self.muscle.k_nms = value,
+            "k_nms" => (self.muscle.k_nms, self.k_nms_known) = (value, true),
+            "wheel_inertia" => self.wheel_inertia = Some(value),
+            "line_offset" => self.line[0] = Some(value),
+            "line_bend" => self.line[1] = Some(value / BEND_RAD_S),
             "t_h_late" => self.late_s[0] = value,
             "t_d_late" => self.late_s[1] = value,
             _ => (self.muscle.t_nms_s, self.t_nms_known) = (value, true),
@@ -196,6 +215,7 @@ impl Options {
             return refuse(format!("a range within {least} to {most} is wanted"));
         }
         self.estimate[i] = Some([low, high]);
+        self.k_nms_known |= i == 0;
         self.t_nms_known |= i == 1;
         let within = |x: &mut f64| *x = x.clamp(low, high);
         match i {

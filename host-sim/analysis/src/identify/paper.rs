@@ -233,6 +233,7 @@ impl<'a> Problem<'a> {
             delay_profile: Vec::new(),
             refuted: Vec::new(),
             assumed: Vec::new(),
+            line: None,
             beyond: Vec::new(),
             starts: vec![Start {
                 from_t_p_s: TABLE_4[T_P].0,

@@ -37,6 +37,8 @@ pub struct Refutation {
 
 /// The assumption that a driver who changed refutes.
 pub(crate) const SAME_DRIVER: &str = "the driver is the same throughout";
+/// The assumption that a line refutes that moves.
+pub(crate) const SAME_LINE: &str = "the driver keeps one line, and e_y_m one offset";
 
 /// One parameter of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -239,13 +241,23 @@ pub struct Combination {
     pub standard_error: f64,
 }
 
-/// What the intervals would be if t_nms were known to be what is assumed.
+/// What the intervals would be if K_nms and t_nms were known to be what is assumed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AtTNms {
     /// t_nms, s.
     pub t_nms_s: f64,
     /// By key.
     pub intervals_95: Vec<(&'static str, [f64; 2])>,
+}
+
+/// The line that the driver takes beside the target line, to the left where positive. A camera whose e_y has an offset looks the
+/// same in every column of the log.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OwnLine {
+    /// On a straight road, m.
+    pub offset: Parameter,
+    /// What is added in a left bend of 300 m at 60 km/h, m; in proportion to the turn of the road, v/R, in others.
+    pub bend: Parameter,
 }
 
 /// Correlation of the estimation errors.
@@ -362,7 +374,7 @@ pub struct Identification {
     pub fit_percent_wheel_angle: Option<f64>,
     /// The driver.
     pub parameters: Parameters,
-    /// The narrower intervals that hold if t_nms is what is assumed; none if it was given or estimated.
+    /// The narrower intervals that hold if K_nms and t_nms are what is assumed; none if both were given or estimated.
     pub at_t_nms: Option<AtTNms>,
     /// What is determined where single parameters are not.
     pub combinations: Vec<Combination>,
@@ -382,6 +394,8 @@ pub struct Identification {
     pub constancy: Option<Constancy>,
     /// The loss over t_p with all else at its best, as minus twice the log likelihood above the optimum.
     pub delay_profile: Vec<[f64; 2]>,
+    /// The line that the driver takes; none for the published method, in which it is the target line.
+    pub line: Option<OwnLine>,
     /// What is usually taken as known and was estimated: k_nms, t_nms, t_h_late, t_d_late.
     pub beyond: Vec<(&'static str, Parameter)>,
     /// Assumptions that the record refutes: with any, nothing is identified.
@@ -406,7 +420,10 @@ pub struct Identification {
 impl Identification {
     /// How the driver changed, if that is what refutes one driver.
     pub fn changed(&self) -> Option<&Change> {
-        let refuted = self.refuted.iter().any(|r| r.assumption == SAME_DRIVER);
+        let refuted = self
+            .refuted
+            .iter()
+            .any(|r| [SAME_DRIVER, SAME_LINE].contains(&r.assumption));
         self.constancy.as_ref()?.change.as_ref().filter(|_| refuted)
     }
 

@@ -10,12 +10,14 @@
 //! to those lines is exact. T_h is what the ECU decided in its last millisecond and holds for the rest of it:
 //! its value belongs to the middle of that millisecond, from where it is moved to the sample instant along its
 //! slope, and then taken as the others. Where T_h jumps faster than the torque envelope can move, a probe
-//! switched (or the guidance failed) on the sample instant, and the old value is held up to it. Half a
+//! switched (or the guidance failed), and the old value is held up to the instant that [`super::switches`] finds. Half a
 //! millisecond matters: with a 2.5 Hz sine as probe it is 10 ms of t_p. The delay is exact for the same lines, at
 //! any fraction of a sample, and so is its derivative:
 //! `d/dt_p L[u](t - t_p) = -(u - L[u])(t - t_p) / t_nms`.
 
-use super::log::{DriveLog, SWITCH_RATE_NM_S};
+use super::log::DriveLog;
+use super::road::road;
+use super::switches::Switches;
 use super::wide::{BLOCK, window};
 
 /// The muscle of equation (8), taken as known (table 4).
@@ -92,18 +94,9 @@ fn lag(u: &[f64], dt_s: f64, t_nms_s: f64, end: impl Fn(f64, f64) -> f64) -> Vec
 /// Response of the lag to the torque that the ECU held, of which the log has samples.
 fn lagged_guidance(log: &DriveLog, t_nms_s: f64) -> Vec<f64> {
     let (torque, dt_s) = (&log.guidance_torque_nm, log.dt_s);
-    // Steps that a probe made, and the continuous rest.
-    let mut steps = vec![0.0];
-    for w in torque.windows(2) {
-        let rise = w[1] - w[0];
-        let step = if rise.abs() > SWITCH_RATE_NM_S * dt_s {
-            rise
-        } else {
-            0.0
-        };
-        steps.push(steps[steps.len() - 1] + step);
-    }
-    let rest: Vec<f64> = torque.iter().zip(&steps).map(|(t, s)| t - s).collect();
+    let switches = Switches::of(log);
+    let steps = &switches.steps;
+    let rest: Vec<f64> = torque.iter().zip(steps).map(|(t, s)| t - s).collect();
     let last = rest.len() - 1;
     let moved: Vec<f64> = (0..=last)
         .map(|k| {
@@ -115,7 +108,19 @@ fn lagged_guidance(log: &DriveLog, t_nms_s: f64) -> Vec<f64> {
         })
         .collect();
     let continuous = lag(&lines(&moved), dt_s, t_nms_s, |_, to| to);
-    let stepped = lag(&steps, dt_s, t_nms_s, |from, _| from);
+    let mut stepped = lag(steps, dt_s, t_nms_s, |from, _| from);
+    if switches.clock.is_some() {
+        let decay = (-dt_s / t_nms_s).exp();
+        let mut more = 0.0;
+        for k in 1..stepped.len() {
+            let rise = steps[k] - steps[k - 1];
+            more *= decay;
+            if rise != 0.0 {
+                more += rise * (1.0 - (-switches.before_row_s(k, dt_s) / t_nms_s).exp());
+            }
+            stepped[k] += more;
+        }
+    }
     continuous.iter().zip(&stepped).map(|(c, s)| c + s).collect()
 }
 
@@ -126,6 +131,8 @@ pub(crate) struct Signals {
     pub t_nms_s: f64,
     /// e_y, Int e_y and e_theta.
     pub visual: [Lagged; 3],
+    /// The turn of the road, rad/s, and its heading, as [`super::road`] has them.
+    pub road: [Lagged; 2],
     /// T_h and the muscle's response to it.
     pub guidance: Vec<f64>,
     pub guidance_raw: Vec<f64>,
@@ -147,6 +154,7 @@ impl Signals {
         let e_y = lines(&log.e_y_m);
         let int_e_y = integral(&e_y, dt_s);
         let visual = [e_y, int_e_y, lines(&log.e_theta_rad)].map(|raw| Lagged::straight(raw, dt_s, t_nms_s));
+        let road = road(log).map(|raw| Lagged::straight(raw, dt_s, t_nms_s));
         let phi = Lagged::straight(lines(&log.wheel_angle_rad), dt_s, t_nms_s);
         let guidance = lagged_guidance(log, t_nms_s);
         let target = log
@@ -160,6 +168,7 @@ impl Signals {
             dt_s,
             t_nms_s,
             visual,
+            road,
             guidance,
             guidance_raw: log.guidance_torque_nm.clone(),
             wheel: phi,
@@ -167,6 +176,22 @@ impl Signals {
             target,
             guided,
         }
+    }
+
+    /// What a driver sees whose own line lies beside the target line by an offset, m, and by so much for each rad/s of the road's
+    /// turn.
+    pub(crate) fn beside(&mut self, offset: f64, bend: f64) {
+        let dt_s = self.dt_s;
+        let [turn, heading] = self.road.clone();
+        let add = |u: &mut Lagged, more: &Lagged, ramp: f64| {
+            for (all, more) in [(&mut u.raw, &more.raw), (&mut u.lagged, &more.lagged)] {
+                for (k, (x, more)) in all.iter_mut().zip(more).enumerate() {
+                    *x += bend * more + ramp * k as f64 * dt_s;
+                }
+            }
+        };
+        add(&mut self.visual[0], &turn, 0.0);
+        add(&mut self.visual[1], &heading, offset);
     }
 
     /// A signal that the driver might have seen, as [`Signals::visual`].

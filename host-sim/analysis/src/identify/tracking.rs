@@ -16,7 +16,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 use super::log::DriveLog;
-use super::noise_model::{self, LONGEST_DELAY_S};
+use super::noise_model::{self, BEND_RAD_S, LONGEST_DELAY_S};
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::Identification;
@@ -84,7 +84,11 @@ pub(crate) fn follow(prepared: &Prepared, options: &Options, whole: &Identificat
     let log = &prepared.log;
     let p = &whole.parameters;
     let found = [&p.gain_1, &p.gain_2, &p.gain_3, &p.k_hg, &p.t_p];
-    let signals = Signals::new(log, whole.muscle(options.muscle));
+    let mut signals = Signals::new(log, whole.muscle(options.muscle));
+    if let Some(line) = whole.line {
+        let [offset, bend] = [line.offset, line.bend].map(|p| p.optimum.unwrap_or(0.0));
+        signals.beside(offset, bend / BEND_RAD_S);
+    }
     let first = (LONGEST_DELAY_S / signals.dt_s).ceil() as usize + 1;
     let dt = signals.dt_s;
 

@@ -64,6 +64,37 @@ fn chunks<'a>(columns: &[&'a [f64]], n: usize) -> Vec<&'a [[f64; FEW]]> {
     columns.iter().map(|c| c[..n].as_chunks().0).collect()
 }
 
+/// Adds the products of the columns of a block with each other, in the lower triangle, and with `errors`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(crate) fn add_products_of_columns<const N: usize>(
+    columns: &[[f64; BLOCK]; N],
+    errors: &[f64; BLOCK],
+    gram: &mut [[f64; N]; N],
+    with_errors: &mut [f64; N],
+) {
+    for i in 0..N {
+        with_errors[i] += dot_of_block(&columns[i], errors);
+        for j in 0..=i {
+            gram[i][j] += dot_of_block(&columns[i], &columns[j]);
+        }
+    }
+}
+
+#[inline(always)]
+fn dot_of_block(a: &[f64; BLOCK], b: &[f64; BLOCK]) -> f64 {
+    let mut parts = [0.0; PARTS];
+    for k in 0..BLOCK / PARTS {
+        for i in 0..PARTS {
+            parts[i] += a[k * PARTS + i] * b[k * PARTS + i];
+        }
+    }
+    let mut sum = 0.0;
+    for part in parts {
+        sum += part;
+    }
+    sum
+}
+
 // What is compiled for several processors has plain loops: iterators and closures would stay calls there.
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]

@@ -53,7 +53,7 @@ pub struct DriveSegment {
     pub ended: Ended,
     /// What took guidance away.
     pub declarations: Vec<Declaration>,
-    /// The drive again, without guidance.
+    /// The drive of the same car by hand, without guidance.
     pub by_hand: ByHand,
 }
 
@@ -73,7 +73,7 @@ pub struct ByHand {
 pub enum Ended {
     /// At its end.
     Whole,
-    /// It ended with a fault that only a new power-up ends.
+    /// A fault that only a new power-up ends.
     Latched,
     /// Off the road.
     Diverged,

@@ -76,7 +76,7 @@ pub struct DesignGuidance {
     /// The first for the search, the second for the judgement.
     stages: [Stage; 2],
     budget: u32,
-    /// How far beyond its bars a set may go: in the loss, and in what else a driver pays.
+    /// Stretches of the bars of the loss, and of what else a driver pays.
     stretches: Vec<[f64; 2]>,
     /// The least and the largest gains.
     range: [Gains; 2],

@@ -49,7 +49,7 @@ pub struct SetRow {
     pub gains: Gains,
     /// In the order of [`BARS`], on the training drives.
     pub ratios: [f64; BARS.len()],
-    /// Drivers at speeds at which the loop becomes unstable ([`Evaluated::unstable`]).
+    /// How many speeds are unstable: [`Evaluated::unstable`].
     pub unstable: u32,
     /// Whether no stable set is better in the peak, in effort or conflict and in the loss.
     pub on_front: bool,

@@ -31,7 +31,7 @@ pub enum Entry<'a> {
     Value(&'a Value),
 }
 
-/// The text of an entry in CSV: nothing for no number, 0 or 1 for a flag.
+/// CSV has nothing for no number, and 0 or 1 for a flag.
 impl fmt::Display for Entry<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -53,7 +53,7 @@ pub fn number(value: &Value) -> Option<f64> {
     }
 }
 
-/// The text of a value in a table's field: a number that reads back to the same bits, a text without quotes.
+/// The text of a table's field: a number that reads back to the same bits, a text without quotes.
 pub fn text(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),

@@ -277,7 +277,7 @@ impl Claims<'_> {
         };
         self.claim(
             "an input that fails at the paper's instant, 0.4 s into the arc, costs at most 1.25 times the larger of the no-failure \
-             and the manual peak; other instants cost more (host-sim handover)",
+             and the manual peak; other instants cost more (cargo xtask handover)",
             |r| r.failure != FailureKind::Torque,
             DRIVERS_T_P
                 .iter()

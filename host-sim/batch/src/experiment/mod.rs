@@ -12,28 +12,13 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
-mod changes;
-mod changing;
-mod corruption;
-mod corruptions;
 mod drives;
-mod kinds;
-mod methods;
-mod recordings;
-mod repetitions;
 
 use serde::Serialize;
 
 pub use crate::paper::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
 pub use crate::recorder::Recorder;
-pub use changes::{Changes, ChangesLine, changes};
-pub use changing::{Changed, DriverChanges, driver_at};
-pub use corruption::{Corruption, POPULATION};
-pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
-pub use kinds::{KINDS, Kind};
-pub use methods::{METHODS, MethodLine, Methods, methods};
-pub use recordings::{CHANNELS, Channel, recordings};
-pub use repetitions::{Repeated, Repetitions, repeat};
+pub use drives::{Driven, driven, driven_by, guided, scenario_of_drive};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Options, identify_as_published, identify_with_noise_model,
@@ -48,7 +33,6 @@ use crate::drivers::identified_driver;
 pub use crate::drivers::{COMPARED, Compared, Probe, compared, truth_of};
 use crate::engine::{Watch, logs, runs};
 use crate::error::StudyError;
-pub use drives::{Driven, driven, driven_by, guided, scenario_of_drive};
 
 /// The paper's trajectory errors with guidance over its participants: smallest, mean, largest, m (4.4).
 pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];

@@ -23,9 +23,9 @@ pub(super) struct Places {
 struct Field {
     /// Seed of the field's own stream.
     seed: u64,
-    /// Which slice each sample has in a Latin hypercube.
+    /// Which slice of a Latin hypercube each sample has.
     slices: Vec<u32>,
-    /// Dimensions of Sobol's sequence: the field's own, and that of the second sample; each with its shift.
+    /// The field's own dimension of Sobol's sequence, and that of the second sample; each with its shift.
     sobol: Vec<(Dimension, u32)>,
 }
 
@@ -141,7 +141,8 @@ mod tests {
         }
     }
 
-    /// The first 2^k numbers of a sequence in base 2 lie one in each of as many slices, in both fields, whatever the shift.
+    /// The first 2^k numbers of a sequence in base 2 lie one in each of so many slices, in both fields, whatever the
+    /// shift.
     #[test]
     fn a_sobol_set_is_even() {
         let places = places(Design::Sobol, 256);

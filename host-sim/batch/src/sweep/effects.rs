@@ -51,12 +51,12 @@ pub struct Effect {
 pub struct Level {
     /// The value, or the mean of the slice.
     pub label: String,
-    /// The value as a number, if it is one.
+    /// The label as a number, if it is one.
     pub x: Option<f64>,
     /// What came of its drives.
     #[serde(flatten)]
     pub drives: Drives,
-    /// What came of the drives with each value of the field that the sweep compares; nothing for that field itself.
+    /// The drives by each value of the field that the sweep compares; of that field itself none.
     pub compared: Vec<Compared>,
 }
 

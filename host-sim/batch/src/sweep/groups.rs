@@ -42,7 +42,7 @@ pub(super) struct Group {
     pub(super) now: Vec<(u64, Moments)>,
     /// The means of the samples before.
     pub(super) observed: Moments,
-    /// Samples before, with a mean or without.
+    /// How many samples came before, with a mean or without.
     observations: u64,
 }
 

@@ -32,7 +32,7 @@ pub struct Summary {
     pub diverged: u64,
     /// Drives in which the ECU ended guidance by itself.
     pub left_by_itself: u64,
-    /// Those drives by why the ECU ended guidance.
+    /// How many of them, by why.
     pub left_why: BTreeMap<String, u64>,
     /// The metric by which drives are called bad.
     pub judge: &'static str,
@@ -45,11 +45,11 @@ pub struct Summary {
     pub beyond: Option<u64>,
     /// The field whose values are told apart, if the sweep compares.
     pub compare: Option<String>,
-    /// How each metric is spread.
+    /// The distribution of each metric.
     pub distributions: Vec<Distribution>,
-    /// What each axis does.
+    /// The effect of each axis.
     pub effects: Vec<Effect>,
-    /// Sobol indices of each sampled field and metric, if the design allows.
+    /// The indices of each sampled field and metric, if the design allows.
     pub sobol: Vec<SobolIndex>,
     /// The worst drives, the worst first.
     pub worst: Vec<Worst>,

@@ -146,7 +146,7 @@ fn a_value_may_go_over_another() {
     );
 }
 
-/// The sum does not depend on how the drives are cut; and a kill costs no more than the chunk under way.
+/// The sum is equal however the drives are cut; and a kill costs no more than the chunk under way.
 #[test]
 fn the_table_does_not_depend_on_threads_shards_and_restarts() {
     let sweep = with_road(
@@ -212,7 +212,7 @@ fn a_directory_of_another_sweep_is_left_alone() {
     assert!(matches!(store.put(0, b"bytes"), Err(StoreError::Corrupted(0))));
 }
 
-/// The peak varies with K_hg from 0 to 1; its mean is known to 20 mm before all 1,000 are driven, at the same
+/// The peak varies while K_hg goes from 0 to 1; its mean is known to 20 mm before all 1,000 are driven, at the same
 /// drive for any number of threads. That the interval is that narrow is computed here from the table.
 #[test]
 fn an_early_stop_stops_where_the_mean_is_known() {

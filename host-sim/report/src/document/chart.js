@@ -93,7 +93,7 @@
 
   // A value under the cursor with so many digits.
   function read(digits) {
-    return (u, v) => (v == null ? "–" : String(Number(v.toPrecision(digits))));
+    return (u, v) => (v == null ? "" : String(Number(v.toPrecision(digits))));
   }
 
   // What stands before a name: the line with its dashes, the dot, the cross, the area.

@@ -10,7 +10,7 @@ const MEMORY_S: f64 = 5.0;
 /// Times of trust and of the estimate in the map, s.
 const TRUST_S: [f64; 6] = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 const DELAYS_S: [f64; 6] = [5.0, 15.0, 25.0, 35.0, 45.0, 55.0];
-/// With how many further lags, and of what time constant: a law that follows at once, and one that follows slowly, s.
+/// Time constants of the further lags of a law: one that follows at once, and one that follows slowly, s.
 const LAW_LAGS_S: [f64; 2] = [0.0, 30.0];
 
 /// The document of a study.

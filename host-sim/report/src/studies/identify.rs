@@ -179,7 +179,10 @@ fn followed(drive: &IdentifiedDrive) -> Figure {
 
 /// What is known of the driver, and what it rests on.
 fn verdict_blocks(found: &Identification) -> Vec<Block> {
-    let sentences = refutations(found).into_iter().chain(verdicts(found));
+    let sentences = refutations(found)
+        .into_iter()
+        .chain(verdicts(found))
+        .chain(own_line(found));
     let mut verdict: Vec<Block> = sentences.map(Block::Text).collect();
     verdict.push(Block::Table(parameters(found)));
     let shown = |name, figure: Option<Figure>, caption| figure.map(|f| Block::figure(name, f, caption));
@@ -187,7 +190,7 @@ fn verdict_blocks(found: &Identification) -> Vec<Block> {
         true => {
             "The intervals as the published method has them: 95 % only where its residuals do not refute them."
         }
-        false => "The 95 % intervals, and what they would be if t_nms were what is assumed.",
+        false => "The 95 % intervals, and what they would be if K_nms and t_nms were what is assumed.",
     };
     let valley =
         "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.";
@@ -313,6 +316,30 @@ fn verdicts(found: &Identification) -> Vec<String> {
     .collect()
 }
 
+/// The line that the driver takes, in words; nothing where the model is refuted.
+fn own_line(found: &Identification) -> Option<String> {
+    let line = found.line.filter(|_| found.refuted.is_empty())?;
+    let place = |p: &Parameter| {
+        let [low, high] = p.interval_95?;
+        let side = |x: f64| format!("{:.3} m {}", x.abs(), if x < 0.0 { "right" } else { "left" });
+        Some(match p.estimate {
+            Some(x) => format!("{} of the target line ({low:.3} to {high:.3} m, 95 %)", side(x)),
+            None => format!("anywhere between {} and {} of it (95 %)", side(low), side(high)),
+        })
+    };
+    let added = match line.bend.estimate {
+        Some(x) if x > 0.0 => "inside it in bends",
+        Some(_) => "outside it in bends",
+        None => "in bends",
+    };
+    Some(format!(
+        "The driver's line is {} on a straight road, and {added}: {} more in a left bend of 300 m at 60 km/h, in proportion to v/R in \
+         others. A camera whose e_y is off by as much looks the same.",
+        place(&line.offset)?,
+        place(&line.bend)?
+    ))
+}
+
 /// Whether the residuals of the published method are not what it takes them for: white, and independent of the inputs.
 fn is_refuted_as_published(found: &Identification) -> bool {
     let depend = found.input_correlation.iter().any(|input| !input.independent);
@@ -382,6 +409,8 @@ fn parameters(found: &Identification) -> Table {
         "95 % from"
     };
     let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
+    let line = found.line.as_ref().filter(|_| found.refuted.is_empty());
+    let line = line.map(|line| [("line_offset", "m", &line.offset), ("line_bend", "m", &line.bend)]);
     let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
     let row = |(name, unit, p): (&'static str, &'static str, &Parameter)| {
         let verdict = match (p.fixed, p.identified, p.on_bound) {
@@ -403,11 +432,16 @@ fn parameters(found: &Identification) -> Table {
             ("Standard error", number(p.standard_error)),
             (from, low),
             ("to", high),
-            ("t_nms known: from", narrow_low),
+            ("Arm known: from", narrow_low),
             ("to", narrow_high),
         ]
     };
-    let all = found.parameters.list().into_iter().chain(beyond);
+    let all = found
+        .parameters
+        .list()
+        .into_iter()
+        .chain(line.into_iter().flatten())
+        .chain(beyond);
     Table::of_rows(caption, all.map(row))
 }
 

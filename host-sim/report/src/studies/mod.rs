@@ -1,9 +1,7 @@
 //! What each study shows: a function of each module makes a report of its results, for a page and for a terminal.
 
 pub mod adaptation;
-pub mod availability;
 pub mod bus;
-mod changes;
 pub mod compare;
 pub mod course;
 mod curves;
@@ -12,18 +10,13 @@ pub mod design_guidance;
 pub mod drivers;
 pub mod evaluation;
 pub mod experiment;
-pub mod faults;
 mod files;
-pub mod handover;
 pub mod identify;
 mod pieces;
-pub mod real_drives;
-pub mod reliance;
 pub mod run;
 pub mod stability;
 pub mod study;
 pub mod sweep;
-pub mod validation;
 
 use crate::document::WriteError;
 use crate::plot::{Mark, Marker, PlotError, Series};
@@ -35,7 +28,7 @@ pub use crate::document::SeriesFormat;
 pub use files::write;
 
 /// Place of a row in a figure of rows.
-fn place(row: usize) -> f64 {
+pub fn place(row: usize) -> f64 {
     row as f64 + 1.0
 }
 

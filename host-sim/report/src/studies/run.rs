@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use super::reliance::panel as reliance_panel;
 use super::{LEFT_THE_ROAD, curves, ended, failure_marker};
 use crate::document::{
     Block, Cell, Provenance, Report, Section, SeriesFormat, Table, WriteError, definitions_table, write_file,
     write_trace,
 };
-use crate::plot::{Axis, Figure, Series};
+use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_batch::reliance::Reading;
 use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::trace::Sample;
 use haptic_log::{Event, candump};
@@ -188,6 +188,29 @@ fn events(single: &SingleRun) -> Vec<Event> {
     events.push(event(end_s, what));
     events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     events
+}
+
+/// The ECU's estimate with two deviations on each side, and the truth: value from an abscissa on. `x` is the
+/// abscissa of a time, s.
+pub fn reliance_panel(
+    title: &str,
+    readings: &[Reading],
+    truth: &[(f64, f64)],
+    x: impl Fn(f64) -> f64,
+) -> Panel {
+    // A line breaks where a value is not finite: no estimate, no line.
+    let estimates = || readings.iter().map(|r| r.estimate.unwrap_or([f64::NAN; 2]));
+    let places: Vec<f64> = readings.iter().map(|r| x(r.time_s)).collect();
+    let ends: Vec<[f64; 2]> = estimates()
+        .map(|[k_hg, deviation]| [k_hg - 2.0 * deviation, k_hg + 2.0 * deviation])
+        .collect();
+    let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
+    let series = [
+        Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
+        Series::line("truth", 0, truth.to_vec()),
+        Series::line("estimate", 1, estimate.collect()),
+    ];
+    Panel::new(title, Axis::new("K_hg", "-").within(-0.5, 1.5), series)
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::processor::{self, ProcessorError};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use haptic_pil::{Channel, Machine, PilError, Target};
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
-use host_sim::processor::{self, ProcessorError};
 
 use super::super::{BadInput, Outcome, print, print_json, progress};
 

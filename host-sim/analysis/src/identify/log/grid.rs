@@ -6,7 +6,8 @@
 
 use haptic_log::recording::Lines;
 
-use super::{GUIDANCE_COLUMN, LogError, SHORTEST_S, SWITCH_RATE_NM_S, refuse, too_short};
+use super::super::switches::SWITCH_RATE_NM_S;
+use super::{GUIDANCE_COLUMN, LogError, SHORTEST_S, refuse, too_short};
 
 /// Share of a sample period by which a time stamp may miss the even grid: rounding to a millisecond makes it 6 %
 /// at 120 Hz and 12.5 % at 250 Hz.

@@ -37,9 +37,6 @@ pub const COLUMNS: [&str; 6] = [
 
 const GUIDANCE_COLUMN: usize = 4;
 
-/// A torque that changes faster than this, N.m/s, has switched: it is the fastest that the envelope allows.
-pub(super) const SWITCH_RATE_NM_S: f64 = 8.0;
-
 /// Largest magnitude that a column may hold, and what a larger one suggests. Chosen so that no drive on a road
 /// reaches it while the usual wrong unit does within the first curve.
 const LIMITS: [(f64, &str); 6] = [

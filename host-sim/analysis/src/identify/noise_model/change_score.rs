@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::T_P;
-use crate::identify::change::Change;
+use super::DRIVER;
+use crate::identify::change::{BLIP_S, Change, Power, Shape};
 
 /// Length of the blocks, s: instants are not told finer.
 pub(super) const BLOCK_S: f64 = 1.0;
@@ -16,11 +16,15 @@ const BEYOND_STEP: f64 = 9.0;
 /// Lengths of a drift that are tried, s.
 const DRIFTS_S: [f64; 9] = [6.0, 10.0, 15.0, 22.0, 32.0, 45.0, 65.0, 95.0, 140.0];
 
-/// Columns of a row: the driver's parameters, the stretch's constant (an offset of T_d), and that times the time (an offset of
-/// e_y, which the driver's integral sums up), which is not fitted.
-pub(super) const OFFSET: usize = T_P + 1;
-pub(super) const SLOPE: usize = OFFSET + 1;
-const LOCAL: usize = SLOPE + 1;
+/// Lengths of a blip that are tried, s.
+const BLIPS_S: [f64; 5] = [5.0, 8.0, 12.0, 18.0, 27.0];
+/// A change is seen in nine of ten drives if its deviance is beyond the level's root by so many standard deviations.
+const NINE_OF_TEN: f64 = 1.28;
+
+/// Columns of a row: the driver's parameters, and the stretch's constant, which is an offset of T_d. In the place of the driver's
+/// offset is what it makes of the torque, a slope: gain_2 is lost where a line moves.
+pub(super) const OFFSET: usize = DRIVER;
+pub(super) const LOCAL: usize = OFFSET + 1;
 
 pub(super) type Local = SVector<f64, LOCAL>;
 type Square = SMatrix<f64, LOCAL, LOCAL>;
@@ -73,7 +77,7 @@ impl Block {
 
     /// The part of `v` that these rows have a share in.
     fn own(&self, v: &DVector<f64>) -> Local {
-        Local::from_fn(|i, _| if i < SLOPE { v[self.place(i)] } else { 0.0 })
+        Local::from_fn(|i, _| v[self.place(i)])
     }
 }
 
@@ -99,7 +103,7 @@ impl Fitted {
         let block = &self.blocks[number];
         sum.score += block.score * share;
         sum.square += block.gram * (share * share);
-        for i in 0..SLOPE {
+        for i in 0..LOCAL {
             let mut row = sum.with.row_mut(block.place(i));
             row += block.gram.row(i) * share;
         }
@@ -168,6 +172,82 @@ impl Fitted {
         Some((ends, self.freed(&sum, direction)?))
     }
 
+    /// A change for some seconds that then goes back, at each of some instants.
+    pub(super) fn blips(&self, direction: &Local) -> Vec<([usize; 2], Freed)> {
+        let count = self.blocks.len();
+        let lengths = BLIPS_S.map(|s| (s / BLOCK_S).round() as usize);
+        let windows = lengths.into_iter().flat_map(|length| {
+            let begins = (0..count.saturating_sub(length)).step_by((length / 4).max(1));
+            begins.map(move |from| [from, from + length])
+        });
+        let windows = windows.filter_map(|ends| Some((ends, self.blip(ends, direction)?)));
+        let mut out: Vec<_> = windows.collect();
+        let most = out.iter().map(|f| f.1.information).fold(0.0, f64::max);
+        out.retain(|f| f.1.information >= LEAST_SHARE * most);
+        out
+    }
+
+    fn blip(&self, [from, to]: [usize; 2], direction: &Local) -> Option<Freed> {
+        let mut sum = self.nothing();
+        for k in from..to {
+            self.add(&mut sum, k, 1.0);
+        }
+        self.freed(&sum, direction)
+    }
+
+    /// What a test at this `level` of twice the log likelihood, and one for blips at `blip_level`, sees of a change.
+    pub(super) fn power(
+        &self,
+        parameter: &'static str,
+        direction: &Local,
+        [level, blip_level]: [f64; 2],
+    ) -> Power {
+        let middle = self.blocks.len() / 2;
+        let least = |freed: Option<Freed>, level: f64| {
+            let information = freed?.information / self.variance;
+            (information > 0.0).then(|| (level.sqrt() + NINE_OF_TEN) / information.sqrt())
+        };
+        let mut half = self.nothing();
+        for k in middle..self.blocks.len() {
+            self.add(&mut half, k, 1.0);
+        }
+        let blip = [
+            middle,
+            (middle + (BLIP_S / BLOCK_S) as usize).min(self.blocks.len()),
+        ];
+        Power {
+            parameter,
+            step: least(self.freed(&half, direction), level),
+            blip: least(self.blip(blip, direction), blip_level),
+        }
+    }
+
+    /// A blip as a change.
+    pub(super) fn change_of_blip(
+        &self,
+        parameter: &'static str,
+        ([from, to], freed): &([usize; 2], Freed),
+    ) -> Change {
+        let at_s = [*from, *to].map(|k| {
+            let last = self.blocks.len() - 1;
+            if k > last {
+                self.blocks[last].to_s
+            } else {
+                self.blocks[k].from_s
+            }
+        });
+        // No finer than the instants that are tried.
+        let step_s = 0.25 * (at_s[1] - at_s[0]).max(4.0 * BLOCK_S);
+        Change {
+            parameter,
+            shape: Shape::Blip,
+            at_s,
+            at_95_s: at_s.map(|t| [t - step_s, t + step_s]),
+            by: freed.by,
+            deviance: freed.deviance,
+        }
+    }
+
     /// The factor by which the scatter of the blocks' scores, less what the change explains, is wider than the prediction errors
     /// say.
     pub(super) fn wider(&self, at: usize, found: &Freed) -> f64 {
@@ -226,6 +306,11 @@ impl Fitted {
         };
         Some(Change {
             parameter,
+            shape: if ends[1] > ends[0] {
+                Shape::Drift
+            } else {
+                Shape::Step
+            },
             at_s: ends.map(|k| self.between(k).iter().sum::<f64>() / 2.0),
             at_95_s: [within(0), within(1)],
             by: found.by,
@@ -246,6 +331,50 @@ mod tests {
     use super::*;
     use crate::identify::noise_model::K_HG;
 
+    /// Forty blocks with one unit of information each on K_hg, which is 0.4 higher in eight of them and was fitted as constant.
+    #[test]
+    fn a_blip_is_told_from_a_step() {
+        let unit = Local::from_fn(|i, _| f64::from(i == K_HG));
+        let within = |k: usize| (10..18).contains(&k);
+        // The mean of 0.4 over 8 of 40 blocks is 0.08.
+        let block = |k: usize| Block {
+            stretch: 0,
+            from_s: k as f64,
+            to_s: k as f64 + 1.0,
+            score: unit * if within(k) { 0.32 } else { -0.08 },
+            gram: unit * unit.transpose(),
+        };
+        let mut inverse = DMatrix::zeros(LOCAL, LOCAL);
+        inverse[(K_HG, K_HG)] = 1.0 / 40.0;
+        let fitted = Fitted {
+            blocks: (0..40).map(block).collect(),
+            inverse,
+            step: DVector::zeros(LOCAL),
+            variance: 1.0,
+        };
+        let blips = fitted.blips(&unit);
+        let found = most(&blips).unwrap();
+        let change = fitted.change_of_blip("k_hg", found);
+        assert_eq!((change.at_s, change.shape), ([10.0, 18.0], Shape::Blip));
+        // 8 blocks of information, less 8 * 8 / 40 that the constant takes.
+        assert!(
+            (change.by - 0.4).abs() < 1e-9 && (change.deviance - 0.16 * 6.4).abs() < 1e-9,
+            "{change:?}"
+        );
+        let step = fitted.steps(&unit);
+        assert!(most(&step).unwrap().1.deviance < change.deviance);
+        // A step in the middle has 20 * 20 / 40 of it: (4 + 1.28) / sqrt(10).
+        let power = fitted.power("k_hg", &unit, [16.0, 25.0]);
+        assert!(
+            (power.step.unwrap() - 5.28 / 10.0_f64.sqrt()).abs() < 1e-9,
+            "{power:?}"
+        );
+        assert!(
+            (power.blip.unwrap() - 6.28 / 6.4_f64.sqrt()).abs() < 1e-9,
+            "{power:?}"
+        );
+    }
+
     /// Ten blocks with one unit of information each on K_hg, which steps by 0.4 in the middle and was fitted as constant: it is 0.2
     /// too high before and 0.2 too low after. Freeing the step takes 10 * 0.2^2 off the sum of squares.
     #[test]
@@ -258,12 +387,12 @@ mod tests {
             score: unit * if k < 5 { -0.2 } else { 0.2 },
             gram: unit * unit.transpose(),
         };
-        let mut inverse = DMatrix::zeros(SLOPE, SLOPE);
+        let mut inverse = DMatrix::zeros(LOCAL, LOCAL);
         inverse[(K_HG, K_HG)] = 0.1;
         let fitted = Fitted {
             blocks: (0..10).map(block).collect(),
             inverse,
-            step: DVector::zeros(SLOPE),
+            step: DVector::zeros(LOCAL),
             variance: 1.0,
         };
         let steps = fitted.steps(&unit);

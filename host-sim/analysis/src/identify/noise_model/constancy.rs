@@ -17,9 +17,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::change_score::{BLOCK_S, Block, Fitted, Local, OFFSET, SLOPE, most};
+use super::change_score::{BLOCK_S, Block, Fitted, Freed, LOCAL, Local, OFFSET, most};
+use super::delays::Line;
 use super::sums::Rows;
-use super::{K_HG, Problem, T_P};
+use super::{K_HG, OWN_OFFSET, Problem, T_P};
 use crate::identify::balance::balance;
 use crate::identify::change::{Change, Constancy, E_Y, T_D};
 use crate::identify::result::Refutation;
@@ -29,6 +30,8 @@ use crate::identify::verdict;
 /// How much a change has to add to twice the log likelihood to be declared. At most two in a hundred constant drivers
 /// are then declared changed.
 const LEVEL: f64 = 16.0;
+/// The same for a change that goes back: it has a length besides, and more of them are tried.
+const BLIP_LEVEL: f64 = 21.0;
 /// Above this value a change is not declared yet, but widens the errors of the estimates.
 const DOUBT: f64 = 10.0;
 
@@ -36,14 +39,9 @@ impl Problem<'_> {
     /// Whether the driver was the same throughout; `None` if there is nothing to estimate. A change that is likely
     /// but not certain widens `errors` by the mean squared distance of the changed driver from the estimate over the
     /// recording.
-    pub(super) fn constancy(
-        &self,
-        p: &[f64],
-        kept: &Rows,
-        variance: f64,
-        errors: &mut DMatrix<f64>,
-    ) -> Option<Constancy> {
-        let fitted = self.fitted(kept, variance);
+    pub(super) fn constancy(&self, p: &[f64], variance: f64, errors: &mut DMatrix<f64>) -> Option<Constancy> {
+        // By torques: where a line moves, gain_2 is lost, and a line by its size with it.
+        let fitted = self.fitted(&self.kept_rows(p, Line::Torques), variance);
         let unit = |i: usize| Local::from_fn(|j, _| f64::from(i == j && (i > T_P || self.is_free(i))));
         let gains = (0..3).map(|i| unit(i) * p[i]).sum();
         let directions: [(&'static str, f64, Local); 5] = [
@@ -51,9 +49,19 @@ impl Problem<'_> {
             ("k_hg", 0.05, unit(K_HG)),
             ("t_p", 0.015, unit(T_P)),
             (T_D, 0.02, unit(OFFSET)),
-            (E_Y, 0.0005, unit(SLOPE)),
+            (E_Y, 0.0005, unit(OWN_OFFSET)),
         ];
+        let levels = [LEVEL, BLIP_LEVEL];
+        let power = directions
+            .iter()
+            .map(|(name, _, d)| fitted.power(name, d, levels))
+            .collect();
         let mut best: Option<(Constancy, [DVector<f64>; 2], f64)> = None;
+        let mut take = |found: Constancy, freed: &Freed, after: f64| {
+            if best.as_ref().is_none_or(|b| b.0.beyond() < found.beyond()) {
+                best = Some((found, freed.sides(), after));
+            }
+        };
         for (parameter, enough, direction) in &directions {
             let steps = fitted.steps(direction);
             let Some((at, step)) = most(&steps) else {
@@ -61,21 +69,39 @@ impl Problem<'_> {
             };
             let wider = fitted.wider(*at, step);
             let deviance = step.deviance / wider;
-            if best.as_ref().is_some_and(|b| b.0.deviance >= deviance) {
-                continue;
-            }
             let changed = deviance > LEVEL && step.by.abs() > *enough;
             let change = changed.then(|| fitted.change(parameter, direction, &steps, wider));
-            let constancy = Constancy {
+            let found = Constancy {
                 deviance,
                 level: LEVEL,
+                power: Vec::new(),
                 change: change.flatten(),
             };
             let after = fitted.shares([*at, *at]).sum::<f64>() / fitted.blocks.len() as f64;
-            best = Some((constancy, step.sides(), after));
+            take(found, step, after);
+            // A slow remnant looks like an offset that comes and goes.
+            let blips = if [T_D, E_Y].contains(parameter) {
+                Vec::new()
+            } else {
+                fitted.blips(direction)
+            };
+            let Some(found @ ([from, to], blip)) = most(&blips) else {
+                continue;
+            };
+            // Its own few blocks would not tell by how much the scores scatter.
+            let deviance = blip.deviance / wider;
+            let changed = deviance > BLIP_LEVEL && blip.by.abs() > *enough;
+            let constancy = Constancy {
+                deviance,
+                level: BLIP_LEVEL,
+                power: Vec::new(),
+                change: changed.then(|| fitted.change_of_blip(parameter, found)),
+            };
+            take(constancy, blip, (to - from) as f64 / fitted.blocks.len() as f64);
         }
-        let (constancy, sides, after) = best?;
-        if constancy.deviance > DOUBT {
+        let (mut constancy, sides, after) = best?;
+        constancy.power = power;
+        if constancy.deviance - constancy.level > DOUBT - LEVEL {
             for (side, share) in sides.iter().zip([1.0 - after, after]) {
                 for i in 0..=T_P {
                     for j in 0..=T_P {
@@ -124,10 +150,9 @@ impl Problem<'_> {
                     gram: Default::default(),
                 };
                 let rows = kept.columns[row..row + count].iter().zip(&kept.errors[row..]);
-                for (k, (columns, error)) in rows.enumerate() {
+                for (columns, error) in rows {
                     let mut x = Local::repeat(kept.by_constant);
                     x.as_mut_slice()[..OFFSET].copy_from_slice(&columns[..OFFSET]);
-                    x[SLOPE] *= self.log.time_s(from + k);
                     block.score += x * *error;
                     block.gram += x * x.transpose();
                 }
@@ -143,9 +168,9 @@ impl Problem<'_> {
         let size = OFFSET + self.stretches.len();
         let (mut hessian, mut score) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for block in &blocks {
-            for i in 0..SLOPE {
+            for i in 0..LOCAL {
                 score[block.place(i)] += block.score[i];
-                for j in 0..SLOPE {
+                for j in 0..LOCAL {
                     hessian[(block.place(i), block.place(j))] += block.gram[(i, j)];
                 }
             }

@@ -3,9 +3,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::delays::Delays;
+use super::delays::{Delays, Line};
 use super::sums::Rows;
-use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, Problem, T_NMS, T_P};
+use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, OWN_BEND, OWN_OFFSET, Problem, T_NMS, T_P};
 use crate::identify::search::{Quadratic, covariance, step};
 
 /// Steps of the delay's profile over the whole range.
@@ -49,7 +49,7 @@ impl Problem<'_> {
         delays.extend((-4..=4).map(|i| (p[T_P] + 0.5 * f64::from(i) * error).clamp(0.0, LONGEST_DELAY_S)));
         delays.sort_by(f64::total_cmp);
         delays.dedup();
-        let along = Delays::new(self, p).at(&delays);
+        let along = Delays::new(self, p, Line::Size).at(&delays);
         delays
             .into_iter()
             .zip(along)
@@ -90,7 +90,7 @@ impl Problem<'_> {
     /// What freeing each assumption would do: a score test of each, with the `free` parameters following.
     pub(super) fn alternatives(&self, p: &[f64], free: &[usize], variance: f64) -> Vec<Alternative> {
         let full = self.all_sums(p);
-        [K_NMS, T_NMS, H_LATE, D_LATE]
+        [K_NMS, T_NMS, H_LATE, D_LATE, OWN_OFFSET, OWN_BEND]
             .into_iter()
             .filter(|&x| !(self.is_free(x) || x == H_LATE && p[K_HG] == 0.0))
             .filter_map(|place| freed(&full, free, place, variance))

@@ -21,7 +21,7 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::sums::Rows;
-use super::{CORE, K_HG, Problem, RHO, T_P};
+use super::{CORE, K_HG, OWN_BEND, OWN_OFFSET, Problem, RHO, T_P};
 use crate::identify::wide::{add_times, dot, dots_of_sum};
 
 /// Rows are averaged over so long, s.
@@ -29,7 +29,7 @@ const BLOCK_S: f64 = 0.1;
 /// Longest time after which an error of the driver's is still seen in what the driver sees, s.
 const REMEMBERED_S: f64 = 20.0;
 /// What the errors may move.
-const PLACES: [usize; 6] = [0, 1, 2, K_HG, T_P, RHO];
+const PLACES: [usize; 8] = [0, 1, 2, K_HG, T_P, OWN_OFFSET, OWN_BEND, RHO];
 
 /// Means of regressors and errors over blocks of rows of one stretch.
 #[derive(Debug, Clone, Default)]

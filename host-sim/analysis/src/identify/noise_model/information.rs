@@ -2,13 +2,14 @@
 //!
 //! With the remnant known, the torque is Gaussian about the model, and the information of a record is the Gauss-Newton
 //! matrix of the prediction errors at the truth over their variance. Its inverse bounds the covariance of every unbiased
-//! estimator (Cramer and Rao). The constants of the stretches are unknowns of no interest and are taken out. Information
+//! estimator (Cramer and Rao). The constants of the stretches and the driver's
+//! own line are unknowns of no interest and are taken out. Information
 //! of drives adds up, so that of a longer drive like this one is in proportion to its length.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::{COUNT, K_HG, Problem, RHO, T_NMS, T_NMS_SD_S, T_P, THETA};
+use super::{COUNT, K_HG, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_NMS_SD_S, T_P, THETA};
 use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
 use crate::identify::prepare::prepare;
@@ -59,15 +60,12 @@ pub fn information(log: &DriveLog, options: &Options, truth: &Truth) -> Informat
     (p[super::K_NMS], p[T_NMS]) = (options.muscle.k_nms, options.muscle.t_nms_s);
     problem.assume_muscle(&p);
     let whole = problem.all_sums(&p).hessian;
-    let constants: Vec<usize> = (COUNT..problem.size()).collect();
-    let inverse = covariance(&whole, &constants);
+    let others: Vec<usize> = (COUNT..problem.size()).chain([OWN_OFFSET, OWN_BEND]).collect();
+    let inverse = covariance(&whole, &others).map(|x| if x.is_finite() { x } else { 0.0 });
+    let taken = &whole * inverse * &whole;
     let of = |i: usize, j: usize| {
-        let (i, j) = (PLACES[i], PLACES[j]);
-        let taken: f64 = constants
-            .iter()
-            .map(|&c| whole[(i, c)] * inverse[(c, c)].min(1e300) * whole[(c, j)])
-            .sum();
-        (whole[(i, j)] - taken) / variance
+        let place = (PLACES[i], PLACES[j]);
+        (whole[place] - taken[place]) / variance
     };
     Information {
         matrix: DMatrix::from_fn(PLACES.len(), PLACES.len(), of),

@@ -7,11 +7,15 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
 use super::sums::Rows;
+use super::uncertainty::Doubts;
 use super::{
-    COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
-    T_NMS_SD_S, T_P, VARIATION_WIDTHS,
+    Assumed, COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem, SMALLEST_ERROR_NM,
+    T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS,
 };
+use crate::identify::balance::Balance;
+use crate::identify::change::{BLIP_S, Change, Power};
 use crate::identify::diagnostics;
+use crate::identify::motion::of_motion;
 use crate::identify::options::Options;
 use crate::identify::result::Refutation;
 use crate::identify::result::{AtTNms, Identification, Parameter, Parameters, STANDARD_NORMAL_95};
@@ -24,14 +28,14 @@ const WIDEST: f64 = 3.0;
 const PROFILE_95: f64 = 3.841;
 /// Share of what counts as right (10 %, 15 ms, 0.05) that another assumption has to move a parameter by to matter.
 const MATTERS: f64 = 0.3;
-/// Standard errors by which the record has to draw t_nms from what is assumed before it is freed.
+/// Standard errors by which the record has to draw K_nms or t_nms from what is assumed before it is freed.
 const DRAWN: f64 = 3.0;
 /// Twice the log likelihood ratio that the driver model has to gain over no driver at all.
 const LEAST_GAIN: f64 = 60.0;
 /// Guidance beyond this, N.m, is no offset of a sensor.
 const GUIDED_NM: f64 = 0.03;
 /// Rows that are further apart do not tell the driver's muscle, whose lag is 0.1 s: at 10 Hz K_hg's optimum is off by three times as
-/// much as at 20 Hz (`host-sim validate --recordings`).
+/// much as at 20 Hz (`cargo xtask validate --recordings`).
 const SLOWEST_S: f64 = 0.055;
 
 /// Where the profile of the delay passes the 95 % level for the first and the last time, or ends below it. Between its points
@@ -95,8 +99,7 @@ impl Problem<'_> {
         found: &mut Identification,
         options: &Options,
         optimum: &Optimum,
-        alternatives: &[Alternative],
-        errors: &DMatrix<f64>,
+        doubts: &Doubts<'_>,
     ) {
         let mut refuted: Vec<Refutation> = Vec::new();
         if options.manual && self.log.guidance_torque_nm.iter().any(|t| t.abs() > GUIDED_NM) {
@@ -116,6 +119,8 @@ impl Problem<'_> {
         if sensor.is_none() {
             refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
         }
+        let signs_are_told = refuted.iter().any(|r| r.assumption == verdict::SIGNS);
+        refuted.extend(of_motion(self.log, &self.stretches, signs_are_told));
         // Where a sensor is wrong, all that follows from it looks like another driver too.
         let change = change.filter(|_| refuted.is_empty());
         let mut others = verdict::of_residuals(
@@ -125,13 +130,16 @@ impl Problem<'_> {
             diagnostics::unexplained_autocorrelation(&found.traces.residual_nm, &self.log.resampling),
         );
         others.extend(self.beside_nothing(optimum).map(|r| (f64::INFINITY, r)));
-        others.extend(self.of_muscle(found, &optimum.point, alternatives, errors));
+        others.extend(self.of_bounds(doubts));
+        others.extend(self.of_muscle(found, &optimum.point, doubts.alternatives, doubts.errors));
         // What the change explains better is no cause of its own, and a change is none where something else explains more: a fit
         // with the cure of the first is judged again.
         let change = change.filter(|c| sensor.is_some() || others.iter().all(|o| o.0 <= c.deviance));
         if let Some(change) = &change {
             others.clear();
-            refuted.push(sensor.unwrap_or_else(|| verdict::of_change(change, self.span_s())));
+            refuted.push(
+                sensor.unwrap_or_else(|| verdict::of_change(change, self.span_s(), self.moved_aside(change))),
+            );
         }
         others.sort_by(|a, b| b.0.total_cmp(&a.0));
         refuted.extend(others.into_iter().map(|o| o.1));
@@ -146,20 +154,106 @@ impl Problem<'_> {
         let p = &optimum.point;
         found.assumed = verdict::ASSUMED.iter().map(|&a| a.to_owned()).collect();
         found.assumed.extend(self.withhold(&mut found.parameters));
+        found.assumed.extend(self.assumed_of_muscle(p));
+        found.assumed.push(match options.wheel_inertia {
+            Some(inertia) => format!(
+                "driver_torque_nm is that of a torsion bar below a wheel of {inertia} kg.m2: the torque of the hands was made of it"
+            ),
+            None => "driver_torque_nm is the torque of the hands: no wheel turns between them and the sensor".to_owned(),
+        });
+        found.assumed.extend(power_of(found));
+        found.notes.extend(found.balance.as_ref().and_then(friction));
+    }
+
+    /// By how much the vehicle is farther to the left after a change than before it, m.
+    fn moved_aside(&self, change: &Change) -> f64 {
+        let mean = |is_of: &dyn Fn(f64) -> bool| {
+            let of_side = self
+                .stretches
+                .iter()
+                .cloned()
+                .flatten()
+                .filter(|&k| is_of(self.log.time_s(k)));
+            let (sum, count) = of_side.fold((0.0, 0.0), |(sum, n), k| (sum + self.log.e_y_m[k], n + 1.0));
+            sum / f64::max(count, 1.0)
+        };
+        mean(&|t| t < change.at_s[0]) - mean(&|t| t > change.at_s[1])
+    }
+
+    /// Bounds of the driver's parameters that the data contradict, and what that may come from.
+    fn of_bounds(&self, doubts: &Doubts<'_>) -> Vec<(f64, Refutation)> {
+        let refutation = |&(i, unbounded): &(usize, f64)| {
+            let error = doubts.errors[(i, i)].sqrt();
+            let beyond = doubts.active.pull[i] / error;
+            let Bounds { low, high } = self.bounds[i];
+            let name = NAMES[i]?;
+            let (assumption, cause, cure) = match i {
+                K_HG if unbounded > high => (
+                    "k_hg lies between 0 (gives way) and 1 (resists)",
+                    "the driver resists with more than the guidance's own torque, or guidance_torque_nm is recorded too small",
+                    "check the scale of guidance_torque_nm; if it is right, this driver is beyond equation (8)",
+                ),
+                K_HG => (
+                    "k_hg lies between 0 (gives way) and 1 (resists)",
+                    "the driver turns with the guidance, or the sign of guidance_torque_nm or its delay is another one",
+                    "check guidance_torque_nm against the torque on the column",
+                ),
+                OWN_OFFSET | OWN_BEND => (
+                    "the driver keeps a line within 1.5 m beside the target line",
+                    "the driver moved from line to line, or e_y_m is not the distance that the driver sees",
+                    "one part of the drive: --from and --to; check e_y_m",
+                ),
+                _ => return None,
+            };
+            let refutation = Refutation {
+                assumption,
+                evidence: format!(
+                    "without its bounds ({low:.2} to {high:.2}) {name} would be {unbounded:.2}, {:.1} standard errors beyond",
+                    beyond.abs()
+                ),
+                cause: cause.to_owned(),
+                cure: cure.to_owned(),
+            };
+            Some((beyond * beyond, refutation))
+        };
+        doubts.active.bounds.iter().filter_map(refutation).collect()
+    }
+
+    /// What was taken as known of the muscle.
+    fn assumed_of_muscle(&self, p: &[f64]) -> Vec<String> {
+        let [low, high] = T_NMS_RANGE_S;
+        let about = |place: usize| self.assumed.iter().find(|a| a.place == place);
+        let mut out = Vec::new();
         if !self.is_free(T_NMS) {
-            let [low, high] = T_NMS_RANGE_S;
-            found.assumed.push(if options.t_nms_known {
-                format!("t_nms is {} s", p[T_NMS])
-            } else {
-                format!(
-                    "t_nms is {} s, give or take {T_NMS_SD_S} s (arms have {low} to {high} s): the errors hold that",
-                    p[T_NMS]
-                )
+            out.push(match about(T_NMS) {
+                Some(Assumed { value, sd, .. }) => {
+                    format!("t_nms is {value} s, give or take {sd} s (arms have {low} to {high} s): the errors hold that")
+                }
+                None => format!("t_nms is {} s", p[T_NMS]),
             });
         }
         if !self.is_free(K_NMS) {
-            found.assumed.push(format!("K_nms is {} N.m/rad", p[K_NMS]));
+            out.push(match about(K_NMS) {
+                Some(Assumed { value, sd, .. }) => {
+                    format!("K_nms is {value} N.m/rad, give or take {sd} N.m/rad: the errors hold that")
+                }
+                None => format!("K_nms is {} N.m/rad", p[K_NMS]),
+            });
         }
+        if let Some(a) = about(OWN_OFFSET) {
+            let sd = a.sd;
+            out.push(format!(
+                "the driver's line is the target line, give or take {sd} m on a straight road and {sd} m in a bend of 300 m at 60 km/h: \
+                 the errors hold that"
+            ));
+        }
+        if let Some(a) = about(H_LATE) {
+            let ms = 1e3 * a.sd;
+            out.push(format!(
+                "the probe switches anywhere between two rows, {ms:.1} ms about their middle: the errors hold that"
+            ));
+        }
+        out
     }
 
     /// Calls nothing identified that this kind of record does not tell, and says why.
@@ -194,11 +288,9 @@ impl Problem<'_> {
             .any(|i| self.is_free(i) && a.moves(i).abs() > errors[(i, i)].sqrt().max(MATTERS * tolerance(i)))
     }
 
-    /// t_nms as the record alone would have it, if that is another than was assumed and matters.
-    pub(super) fn drawn_t_nms(&self, optimum: &Optimum) -> Option<f64> {
-        if self.is_free(T_NMS) {
-            return None;
-        }
+    /// What of the muscle the record alone would have as another one than was assumed, if that matters: the surer of K_nms and
+    /// t_nms.
+    pub(super) fn drawn(&self, optimum: &Optimum) -> Option<usize> {
         let p = &optimum.point;
         let free: Vec<usize> = (0..self.size())
             .filter(|&i| self.is_free(i) && (i >= super::COUNT || !self.bounds[i].touches(p[i])))
@@ -207,41 +299,48 @@ impl Problem<'_> {
             (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2));
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
         let all = self.alternatives(p, &free, variance);
-        let a = all.into_iter().find(|a| a.place == T_NMS)?;
-        (a.z.abs() > DRAWN && self.matters(&a, p, &errors)).then_some(p[T_NMS] + a.step)
+        all.into_iter()
+            .filter(|a| [K_NMS, T_NMS].contains(&a.place))
+            .filter(|a| self.assumed.iter().any(|known| known.place == a.place))
+            .filter(|a| a.z.abs() > DRAWN && self.matters(a, p, &errors))
+            .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))
+            .map(|a| a.place)
     }
 
-    /// Widens the standard errors by what is not known of t_nms, and says where the record draws the parameters by it: t_nms
-    /// is that of drivers' arms, about what is assumed, and what the record says of it; to first order. What the record says
-    /// has the covariance `drawn_with` with the estimates.
-    pub(super) fn widen_by_t_nms(
+    /// Widens the standard errors by what is not known of the muscle, and says where the record draws the parameters by it:
+    /// K_nms and t_nms are those of drivers' arms, about what is assumed, and what the record says of each; to first order.
+    /// What the record says of t_nms has the covariance `drawn_with` with the estimates.
+    pub(super) fn widen_by_assumed(
         &self,
         errors: &mut DMatrix<f64>,
         alternatives: &[Alternative],
         drawn_with: Option<&DVector<f64>>,
     ) -> DVector<f64> {
         let mut drawn = DVector::zeros(errors.nrows());
-        let Some(a) = alternatives.iter().find(|a| a.place == T_NMS) else {
-            return drawn;
-        };
-        let (known, seen) = (T_NMS_SD_S.powi(2), a.error.powi(2));
-        let variance = known * seen / (known + seen);
-        let share = known / (known + seen);
-        let step = a.step * share;
-        let with = |i: usize| drawn_with.map_or(0.0, |c| share * c[i]);
-        for i in (0..=T_P).filter(|&i| self.is_free(i)) {
-            drawn[i] = a.slopes[i] * step;
-            for j in (0..=T_P).filter(|&j| self.is_free(j)) {
-                errors[(i, j)] +=
-                    variance * a.slopes[i] * a.slopes[j] + with(i) * a.slopes[j] + with(j) * a.slopes[i];
+        for known in &self.assumed {
+            let Some(a) = alternatives.iter().find(|a| a.place == known.place) else {
+                continue;
+            };
+            let (before, seen) = (known.sd.powi(2), a.error.powi(2));
+            let variance = before * seen / (before + seen);
+            let share = before / (before + seen);
+            let step = a.step * share;
+            let drawn_with = drawn_with.filter(|_| known.place == T_NMS);
+            let with = |i: usize| drawn_with.map_or(0.0, |c| share * c[i]);
+            for i in (0..super::DRIVER).filter(|&i| self.is_free(i)) {
+                drawn[i] += a.slopes[i] * step;
+                for j in (0..super::DRIVER).filter(|&j| self.is_free(j)) {
+                    errors[(i, j)] +=
+                        variance * a.slopes[i] * a.slopes[j] + with(i) * a.slopes[j] + with(j) * a.slopes[i];
+                }
             }
         }
         drawn
     }
 
-    /// The 95 % intervals if t_nms is what is assumed, from the standard errors that hold then; at a bound by the likelihood
-    /// ratio, as the wider ones.
-    pub(super) fn at_t_nms(&self, p: &[f64], errors: &DMatrix<f64>, pull: &DVector<f64>) -> AtTNms {
+    /// The 95 % intervals if K_nms and t_nms are what is assumed, from the standard errors that hold then; at a bound by the
+    /// likelihood ratio, as the wider ones.
+    pub(super) fn as_assumed(&self, p: &[f64], errors: &DMatrix<f64>, pull: &DVector<f64>) -> AtTNms {
         let interval = |i: usize| {
             let (bounds, width) = (self.bounds[i], VARIATION_WIDTHS[i]);
             Parameter::estimated(p[i], pull[i], errors[(i, i)], 0.0, bounds, width).interval_95
@@ -264,7 +363,7 @@ impl Problem<'_> {
         point[..=K_HG].fill(0.0);
         point[K_NMS] = 0.0;
         let mut bounds = self.bounds.clone();
-        for i in (0..=T_P).chain([K_NMS, T_NMS, H_LATE, D_LATE]) {
+        for i in (0..=T_P).chain([OWN_OFFSET, OWN_BEND, K_NMS, T_NMS, H_LATE, D_LATE]) {
             bounds[i] = Bounds::new(point[i], point[i]);
         }
         let nothing = minimise(&point, &bounds, COMPARED, |p| self.core_sums(p));
@@ -281,6 +380,70 @@ impl Problem<'_> {
             cure: "check the sensor and the column of the log".to_owned(),
         })
     }
+}
+
+/// What the tests of the driver's constancy and of the sensors see, and what they do not.
+fn power_of(found: &Identification) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(constancy) = &found.constancy {
+        let of = |pick: fn(&Power) -> Option<f64>| -> String {
+            let seen = constancy.power.iter().filter_map(|p| {
+                let least = pick(p);
+                Some(match p.parameter {
+                    "k_hg" => least
+                        .filter(|x| *x < 1.0)
+                        .map_or("no k_hg".to_owned(), |x| format!("k_hg by {x:.2}")),
+                    "k_d" => least
+                        .filter(|x| *x < 1.0)
+                        .map_or("no gains".to_owned(), |x| format!("gains by {:.0} %", 100.0 * x)),
+                    "t_p" => least
+                        .filter(|x| *x < 0.6)
+                        .map_or("no t_p".to_owned(), |x| format!("t_p by {x:.2} s")),
+                    _ => return None,
+                })
+            });
+            seen.collect::<Vec<_>>().join(", ")
+        };
+        let blind = constancy
+            .power
+            .iter()
+            .all(|p| p.step.is_none_or(|x| x > 0.5 || p.parameter == "t_p" && x > 0.3));
+        out.push(format!(
+            "the driver is the same throughout{}: of nine changes in ten, one that stays is seen from here on ({}), and one of {BLIP_S} \
+             s ({})",
+            if blind { ", which this drive is too short to tell" } else { "" },
+            of(|p| p.step),
+            of(|p| p.blip),
+        ));
+    }
+    let too_little = match &found.balance {
+        None => Some("too short, or at more than one speed"),
+        Some(b) if b.explained < verdict::BALANCE_SEEN => {
+            Some("the column does not answer as one with a wheel alone, or hardly slides")
+        }
+        Some(_) => None,
+    };
+    if found.balance.as_ref().is_some_and(|b| b.friction_nm.is_some()) {
+        out.push(
+            "torques and wheel angle were sampled at the same instants, and the scale of driver_torque_nm is right to 30 %: beside \
+             friction the torques on the column tell no more"
+                .to_owned(),
+        );
+    }
+    out.extend(too_little.map(|why| {
+        format!("torques and wheel angle have their signs, scales and instants: the torques on the column could not be weighed ({why})")
+    }));
+    out
+}
+
+/// What is to be said of the column's friction.
+fn friction(balance: &Balance) -> Option<String> {
+    let [friction, error] = balance.friction_nm?;
+    Some(format!(
+        "The column has {friction:.3} +- {error:.3} N.m of dry friction: its torques were weighed over the {:.0} s in which the \
+         wheel slides.",
+        balance.seconds
+    ))
 }
 
 #[cfg(test)]
@@ -331,7 +494,7 @@ mod tests {
         errors[(T_P, T_P)] = 0.05 * 0.05;
         let mut pull = DVector::zeros(problem.size());
         pull[T_P] = -0.15;
-        let at = problem.at_t_nms(&vec![0.0; problem.size()], &errors, &pull);
+        let at = problem.as_assumed(&vec![0.0; problem.size()], &errors, &pull);
         let (_, [low, high]) = at.intervals_95.iter().find(|i| i.0 == "t_p").unwrap();
         assert!(*low == 0.0 && (high - 0.02917).abs() < 1e-4, "{low} {high}");
     }

@@ -11,6 +11,10 @@
 //! input of that or an earlier instant can carry it, so the estimate is consistent and its standard errors,
 //! from the Gauss-Newton matrix, hold (Ljung, "System Identification", sections 8.3 and 13.4).
 //!
+//! A driver's own line lies beside the target line by an offset and by a part in proportion to the road's turn. The integral of
+//! e_y takes up both, and a fit without them has no gain_2; so both are estimated where the record shows a line, and held in
+//! the errors where it does not.
+//!
 //! The constant is (K_d + K_nms)*a_2 times what Int e_y was before the record began. The rows before
 //! [`LONGEST_DELAY_S`] + 5 t_nms are not used: there the delayed inputs, or what the muscle still remembers of
 //! the time before them, are not in the record.
@@ -36,15 +40,16 @@ mod uncertainty;
 
 use std::ops::Range;
 
-use delays::Delays;
+use delays::{Delays, Line};
 pub use information::{INFORMED, Information, Truth, information};
 
 use super::log::DriveLog;
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
-use super::result::{Identification, Start};
+use super::result::{Identification, SAME_LINE, Start};
 use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
 use super::signals::{Muscle, Signals};
+use super::switches::Switches;
 
 /// Longest delay that is searched, s: twice table 4's, to hold the paper's inattentive driver (0.5 s).
 pub const LONGEST_DELAY_S: f64 = 0.6;
@@ -54,16 +59,21 @@ const K_HG: usize = 3;
 /// How many come first that the torque is linear in.
 const LINEAR: usize = 4;
 const T_P: usize = 4;
-const RHO: usize = 5;
-const THETA: usize = 6;
+/// The line that the driver takes beside the target line: an offset, m, and a part in proportion to the road's turn, m by rad/s.
+const OWN_OFFSET: usize = 5;
+const OWN_BEND: usize = 6;
+/// How many are the driver's.
+const DRIVER: usize = 7;
+const RHO: usize = 7;
+const THETA: usize = 8;
 /// What is always searched, unless it is given.
-const CORE: usize = 7;
-/// What is taken as known unless the caller asks for an estimate ([`Extra`]).
-const K_NMS: usize = 7;
-const T_NMS: usize = 8;
-const H_LATE: usize = 9;
-const D_LATE: usize = 10;
-const COUNT: usize = 11;
+const CORE: usize = 9;
+/// What is taken as known unless the caller asks for an estimate, or the record draws it away.
+const K_NMS: usize = 9;
+const T_NMS: usize = 10;
+const H_LATE: usize = 11;
+const D_LATE: usize = 12;
+const COUNT: usize = 13;
 /// Keys of the parameters that are the driver's and the sensors', by place. The constants of the stretches follow.
 const NAMES: [Option<&str>; COUNT] = [
     Some("gain_1"),
@@ -71,6 +81,8 @@ const NAMES: [Option<&str>; COUNT] = [
     Some("gain_3"),
     Some("k_hg"),
     Some("t_p"),
+    Some("line_offset"),
+    Some("line_bend"),
     None,
     None,
     Some("k_nms"),
@@ -86,6 +98,8 @@ const VARIATION_WIDTHS: [f64; COUNT] = [
     4.0 * 2.0,
     1.0,
     LONGEST_DELAY_S,
+    1.0,
+    1.0 / BEND_RAD_S,
     f64::NAN,
     f64::NAN,
     2.0,
@@ -93,6 +107,18 @@ const VARIATION_WIDTHS: [f64; COUNT] = [
     0.1,
     0.1,
 ];
+
+/// The turn of the road in a bend of 300 m at 60 km/h, rad/s: what a line in bends is judged by.
+pub(crate) const BEND_RAD_S: f64 = 60.0 / 3.6 / 300.0;
+/// What is known of a driver's own line where the record does not show one, m: its standard deviation about the target line on a
+/// straight road, and that of its part in a bend.
+const LINE_SD_M: f64 = 0.05;
+/// What a line has to add to twice the log likelihood before it is estimated: where gain_2 is weak, some line always adds a few.
+const LINE_LEVEL: f64 = 16.0;
+/// A driver's own line is within so much of the target line, m: the target line is in the same lane.
+const LARGEST_LINE_M: f64 = 1.5;
+/// A gain_2 below this, N.m/(m.s), does not tell where a driver's line is: the search then starts on the target line.
+const LEAST_GAIN_2: f64 = 0.01;
 
 /// Defaults of table 4 for `gain_i` and K_hg.
 const START: [f64; 4] = [0.4, 0.04, 14.8, 0.5];
@@ -106,7 +132,11 @@ const START_CORNERS_HZ: [f64; 2] = [0.5, 5.0];
 /// assumed, s. Published arms have 0.06 to 0.15 s.
 const T_NMS_RANGE_S: [f64; 2] = [0.06, 0.15];
 const T_NMS_SD_S: f64 = 0.03;
-/// Where it is searched once it is freed, s.
+/// The standard deviation of K_nms about the value assumed, N.m/rad: stiffnesses from half of table 4's to half as much again
+/// are usual.
+const K_NMS_SD: f64 = 0.25;
+/// Where both are searched once they are freed, N.m/rad and s.
+const K_NMS_SEARCHED: [f64; 2] = [0.0, 4.0];
 const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
 
 /// Expected improvement, as a share of the loss, below which the search ends. With tens of thousands of rows
@@ -127,38 +157,71 @@ pub fn identify(log: &DriveLog, options: &Options) -> Identification {
 /// Identifies the driver of a log that was prepared.
 pub(crate) fn identify_prepared(prepared: &Prepared, options: &Options) -> Identification {
     let mut problem = Problem::new(prepared, options);
-    let (mut optimum, starts) = problem.search();
+    let (optimum, starts) = problem.search();
     problem.assume_muscle(&optimum.point);
-    let drawn = if options.t_nms_known {
-        None
-    } else {
-        problem.drawn_t_nms(&optimum)
-    };
-    if drawn.is_some() {
-        optimum = problem.free_t_nms(&optimum);
+    if problem.line_is_evident(&optimum) {
+        return problem.with_line(prepared, options);
     }
-    optimum = problem.restrict(optimum);
-    problem.report(prepared, options, &optimum, starts)
+    let found = problem.found(prepared, options, optimum, starts);
+    // Before a line is said to move, it may be another one than the target line throughout.
+    let moves = found.refuted.iter().any(|r| r.assumption == SAME_LINE);
+    if moves && problem.line_may_be_freed() {
+        return Problem::new(prepared, options).with_line(prepared, options);
+    }
+    found
+}
+
+/// Something that is not known exactly although nobody asked for an estimate.
+#[derive(Clone, Copy)]
+struct Assumed {
+    place: usize,
+    value: f64,
+    /// Standard deviation about that value.
+    sd: f64,
 }
 
 struct Problem<'a> {
     log: &'a DriveLog,
     muscle: Muscle,
-    /// Where a search for t_nms begins.
-    assumed_t_nms_s: f64,
+    /// What is taken as known give or take something: K_nms, t_nms, the instants of a probe's switches, the driver's line.
+    assumed: Vec<Assumed>,
     signals: Signals,
     bounds: Vec<Bounds>,
     /// Rows that the loss is taken over.
     stretches: Vec<Range<usize>>,
     /// Whether anything beyond [`CORE`] is searched.
     extended: bool,
-    /// Standard deviation of t_nms about what is assumed, s, where it is estimated although nobody asked for it.
-    t_nms_prior_s: Option<f64>,
     /// Whether the disturbance's corner was estimated by restricted likelihood, and then held.
     corner_restricted: bool,
 }
 
 impl<'a> Problem<'a> {
+    /// The identification with a line of the driver's own.
+    fn with_line(&mut self, prepared: &Prepared, options: &Options) -> Identification {
+        self.free_line();
+        let (optimum, starts) = self.search();
+        self.assume_muscle(&optimum.point);
+        self.found(prepared, options, optimum, starts)
+    }
+
+    /// The identification from where the search ended: with what the record draws away from what was assumed, and the
+    /// disturbance's corner.
+    fn found(
+        &mut self,
+        prepared: &Prepared,
+        options: &Options,
+        mut optimum: Optimum,
+        starts: Vec<Start>,
+    ) -> Identification {
+        // Once for K_nms and once for t_nms, at most.
+        for _ in 0..2 {
+            let Some(place) = self.drawn(&optimum) else { break };
+            optimum = self.freed(place, &optimum);
+        }
+        optimum = self.restrict(optimum);
+        self.report(prepared, options, &optimum, starts)
+    }
+
     fn new(prepared: &'a Prepared, options: &Options) -> Self {
         let log = &prepared.log;
         let muscle = options.muscle;
@@ -190,32 +253,100 @@ impl<'a> Problem<'a> {
         }
         pin(&mut bounds[K_HG], options.k_hg.or(options.manual.then_some(0.0)));
         pin(&mut bounds[T_P], options.t_p_s);
+        // The target line, unless the record shows another one.
+        pin(&mut bounds[OWN_OFFSET], options.line[0].or(Some(0.0)));
+        pin(&mut bounds[OWN_BEND], options.line[1].or(Some(0.0)));
         let known = [muscle.k_nms, muscle.t_nms_s, options.late_s[0], options.late_s[1]];
         for (i, (&value, range)) in known.iter().zip(&options.estimate).enumerate() {
             bounds[K_NMS + i] = range.map_or(Bounds::new(value, value), |[low, high]| Bounds::new(low, high));
         }
+        let untimed = Switches::of(log).are_untimed();
+        // Anywhere in a row: its standard deviation is that over the root of twelve.
+        let of_row_s = log.dt_s / 12.0_f64.sqrt();
+        let [offset, bend] = options.line.map(|l| l.is_none());
+        let assumed = [
+            (!options.k_nms_known, K_NMS, muscle.k_nms, K_NMS_SD),
+            (!options.t_nms_known, T_NMS, muscle.t_nms_s, T_NMS_SD_S),
+            (
+                untimed && options.estimate[2].is_none(),
+                H_LATE,
+                options.late_s[0],
+                of_row_s,
+            ),
+            (offset, OWN_OFFSET, 0.0, LINE_SD_M),
+            (bend, OWN_BEND, 0.0, LINE_SD_M / BEND_RAD_S),
+        ];
+        let assumed = assumed.into_iter().filter(|a| a.0);
         Self {
             log,
             muscle,
-            assumed_t_nms_s: muscle.t_nms_s,
+            assumed: assumed
+                .map(|(_, place, value, sd)| Assumed { place, value, sd })
+                .collect(),
             signals,
             bounds,
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],
-            t_nms_prior_s: None,
             corner_restricted: false,
         }
     }
 
-    /// The optimum with t_nms free, held near what was assumed by what is known of it, from the one without.
-    fn free_t_nms(&mut self, from: &Optimum) -> Optimum {
-        self.bounds[T_NMS] = Bounds::new(T_NMS_SEARCHED_S[0], T_NMS_SEARCHED_S[1]);
-        self.t_nms_prior_s = Some(T_NMS_SD_S);
+    /// The optimum with something free that was assumed, held near that by what is known of it, from the one without.
+    fn freed(&mut self, place: usize, from: &Optimum) -> Optimum {
+        let [low, high] = if place == T_NMS {
+            T_NMS_SEARCHED_S
+        } else {
+            K_NMS_SEARCHED
+        };
+        self.bounds[place] = Bounds::new(low, high);
         self.extended = true;
         let bounds = self.bounds.clone();
         let freed = minimise(&from.point, &bounds, TOLERANCE, |p| self.evaluate(p));
         self.assume_muscle(&freed.point);
         freed
+    }
+
+    /// Whether a line of the driver's own explains more than chance does, with all else that is linear following.
+    fn line_is_evident(&self, optimum: &Optimum) -> bool {
+        let p = &optimum.point;
+        let mut bounds = self.bounds.clone();
+        let own = || {
+            self.assumed
+                .iter()
+                .map(|a| a.place)
+                .filter(|i| [OWN_OFFSET, OWN_BEND].contains(i))
+        };
+        own().for_each(|i| bounds[i] = Bounds::FREE);
+        // Without its bound: gain_2 rests on it where there is a line.
+        bounds[1].low = f64::NEG_INFINITY;
+        let quadratics = Delays::new(self, p, Line::Torques).at(&[p[T_P]]);
+        let gain: f64 = quadratics
+            .iter()
+            .map(|q| {
+                let d = step(p, &bounds, q, 0.0);
+                -q.gradient.dot(&d) - 0.5 * d.dot(&(&q.hessian * &d))
+            })
+            .sum();
+        let variance =
+            (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2));
+        self.line_may_be_freed() && 2.0 * gain / variance > LINE_LEVEL
+    }
+
+    fn line_may_be_freed(&self) -> bool {
+        self.assumed
+            .iter()
+            .any(|a| [OWN_OFFSET, OWN_BEND].contains(&a.place))
+    }
+
+    /// Lets the driver have a line of his own, of which nothing is known but that it is in the lane.
+    fn free_line(&mut self) {
+        for (i, scale) in [(OWN_OFFSET, 1.0), (OWN_BEND, 1.0 / BEND_RAD_S)] {
+            if self.assumed.iter().any(|a| a.place == i) {
+                self.bounds[i] = Bounds::new(-LARGEST_LINE_M * scale, LARGEST_LINE_M * scale);
+            }
+        }
+        self.assumed
+            .retain(|a| ![OWN_OFFSET, OWN_BEND].contains(&a.place));
     }
 
     fn is_free(&self, i: usize) -> bool {
@@ -242,7 +373,7 @@ impl<'a> Problem<'a> {
     /// Loss, gradient and Gauss-Newton matrix at `p`, after what is linear was solved for.
     fn evaluate(&mut self, p: &mut [f64]) -> Quadratic {
         self.assume_muscle(p);
-        let linear = self.light_sums(p, false);
+        let linear = self.linear_sums(p);
         let solution = step(p, &self.bounds, &linear, 0.0);
         for (x, d) in p.iter_mut().zip(solution.iter()) {
             *x += d;
@@ -254,25 +385,28 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The loss with what is known of t_nms beside the record, where it is estimated although nobody asked for it; and how far
-    /// t_nms is from what is assumed, in standard deviations.
-    fn with_prior(&self, p: &[f64], mut quadratic: Quadratic) -> (Quadratic, f64) {
-        // As so much more of a likelihood whose variance is the loss's own: L (1 + d^2/rows).
-        let d = self
-            .t_nms_prior_s
-            .map_or(0.0, |sd| (p[T_NMS] - self.assumed_t_nms_s) / sd);
-        quadratic.loss *= 1.0 + d * d / self.row_count().max(1) as f64;
-        (quadratic, d)
+    /// What was assumed and is estimated all the same.
+    fn held(&self) -> impl Iterator<Item = &Assumed> {
+        self.assumed.iter().filter(|a| self.is_free(a.place))
     }
 
-    /// The same with the derivatives by t_nms: only for sums that have those of the record too.
-    fn with_prior_by_t_nms(&self, p: &[f64], quadratic: Quadratic) -> Quadratic {
+    /// The loss with what is known beside the record of what is [`Self::held`].
+    fn with_prior(&self, p: &[f64], mut quadratic: Quadratic) -> Quadratic {
+        // As so much more of a likelihood whose variance is the loss's own: L (1 + d^2/rows).
+        let squares: f64 = self.held().map(|a| ((p[a.place] - a.value) / a.sd).powi(2)).sum();
+        quadratic.loss *= 1.0 + squares / self.row_count().max(1) as f64;
+        quadratic
+    }
+
+    /// The same with the derivatives by that: only for sums that have those of the record too.
+    fn with_prior_by_muscle(&self, p: &[f64], quadratic: Quadratic) -> Quadratic {
         let loss = quadratic.loss;
-        let (mut quadratic, d) = self.with_prior(p, quadratic);
-        if let Some(sd) = self.t_nms_prior_s {
-            let rows = self.row_count().max(1) as f64;
-            quadratic.gradient[T_NMS] += loss * 2.0 * d / (rows * sd);
-            quadratic.hessian[(T_NMS, T_NMS)] += loss * 2.0 / (rows * sd * sd);
+        let mut quadratic = self.with_prior(p, quadratic);
+        let rows = self.row_count().max(1) as f64;
+        for a in self.held() {
+            let per_sd = loss * 2.0 / (rows * a.sd);
+            quadratic.gradient[a.place] += per_sd * (p[a.place] - a.value) / a.sd;
+            quadratic.hessian[(a.place, a.place)] += per_sd / a.sd;
         }
         quadratic
     }
@@ -310,7 +444,7 @@ impl<'a> Problem<'a> {
         let mut point = vec![0.0; self.size()];
         point[..LINEAR].copy_from_slice(&START);
         point[K_NMS] = self.muscle.k_nms;
-        point[T_NMS] = self.assumed_t_nms_s;
+        point[T_NMS] = self.muscle.t_nms_s;
         point[RHO] = (-std::f64::consts::TAU * corner_hz * self.signals.dt_s).exp();
         for (x, b) in point.iter_mut().zip(&self.bounds) {
             *x = x.clamp(b.low, b.high);
@@ -318,18 +452,33 @@ impl<'a> Problem<'a> {
         self.assume_muscle(&point);
         let Bounds { low, high } = self.bounds[T_P];
         let delays = START_DELAYS_S.map(|t_p| t_p.clamp(low, high));
-        let best = Delays::new(self, &point)
+        // The torques of a line of the driver's own need no gain_2, which a fit without them would lose.
+        let mut bounds = self.bounds.clone();
+        for i in [OWN_OFFSET, OWN_BEND].into_iter().filter(|&i| self.is_free(i)) {
+            bounds[i] = Bounds::FREE;
+            point[i] = 0.0;
+        }
+        let best = Delays::new(self, &point, Line::Torques)
             .at(&delays)
             .into_iter()
             .map(|linear| {
-                let solution = step(&point, &self.bounds, &linear, 0.0);
+                let solution = step(&point, &bounds, &linear, 0.0);
                 let gain =
                     -linear.gradient.dot(&solution) - 0.5 * solution.dot(&(&linear.hessian * &solution));
-                linear.loss - gain
+                (linear.loss - gain, solution)
             })
             .zip(delays)
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        point[T_P] = best.map_or(low, |(_, t_p)| t_p);
+            .min_by(|a, b| a.0.0.total_cmp(&b.0.0));
+        let Some(((_, solution), t_p)) = best else {
+            return point;
+        };
+        point[T_P] = t_p;
+        let gain_2 = point[1] + solution[1];
+        for i in [OWN_OFFSET, OWN_BEND] {
+            if self.is_free(i) && gain_2 > LEAST_GAIN_2 {
+                point[i] = (solution[i] / gain_2).clamp(self.bounds[i].low, self.bounds[i].high);
+            }
+        }
         point
     }
 }

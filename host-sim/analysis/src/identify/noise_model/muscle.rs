@@ -3,10 +3,15 @@
 use nalgebra::DMatrix;
 
 use super::evidence::Alternative;
-use super::{NAMES, Problem, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S};
+use super::{Assumed, K_NMS, NAMES, Problem, T_NMS, T_NMS_RANGE_S};
 use crate::identify::result::Identification;
 use crate::identify::result::Refutation;
 use crate::identify::verdict;
+
+/// By so much t_nms may be outside of the range of arms all the same, s: the range is of rounded figures.
+const ROUNDING_S: f64 = 0.002;
+/// What an arm that is none counts at least, in twice the log likelihood.
+const REFUTES: f64 = 25.0;
 
 impl Problem<'_> {
     /// What the record refutes of the muscle and of the sensors' delays, each with what it adds to twice the log likelihood.
@@ -19,6 +24,7 @@ impl Problem<'_> {
     ) -> Vec<(f64, Refutation)> {
         let likeliest = alternatives
             .iter()
+            .filter(|a| a.place >= K_NMS)
             .filter(|a| a.z.abs() > verdict::CERTAIN && self.matters(a, p, errors))
             .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()));
         let mut out = Vec::new();
@@ -36,24 +42,42 @@ impl Problem<'_> {
             };
             out.push((a.z * a.z, refutation));
         }
-        if self.t_nms_prior_s.is_some() {
-            let [low, high] = T_NMS_RANGE_S;
-            let (assumed, drawn, error) = (self.assumed_t_nms_s, p[T_NMS], errors[(T_NMS, T_NMS)].sqrt());
+        for a in self.held() {
+            let (name, unit) = if a.place == T_NMS {
+                ("t_nms", "s")
+            } else {
+                ("k_nms", "N.m/rad")
+            };
+            let (drawn, error) = (p[a.place], errors[(a.place, a.place)].sqrt());
+            let Assumed { value, sd, .. } = *a;
             found.notes.push(format!(
-                "the record draws t_nms from the {assumed} s that are assumed to {drawn:.3} +- {error:.3} s: it was \
-                 estimated, held near {assumed} s by {T_NMS_SD_S} s. --fix t_nms={assumed} keeps it."
+                "the record draws {name} from the {value} {unit} that are assumed to {drawn:.3} +- {error:.3} {unit}: it was \
+                 estimated, held near {value} {unit} by {sd} {unit}. --fix {name}={value} keeps it."
             ));
-            let beyond = (low - drawn).max(drawn - high);
-            if beyond > 0.01 + verdict::CERTAIN * error {
+            let [low, high] = T_NMS_RANGE_S;
+            if a.place == T_NMS && !(low - ROUNDING_S..=high + ROUNDING_S).contains(&drawn) {
+                let beyond = (low - drawn).max(drawn - high);
                 let refutation = Refutation {
                     assumption: "t_nms is that of an arm",
                     evidence: format!(
                         "it would have to be {drawn:.3} +- {error:.3} s; arms have {low} to {high} s"
                     ),
-                    cause: "a torque sensor is filtered or late, or the driver is another one".to_owned(),
-                    cure: "--estimate t_d_late or t_h_late; --fix t_nms=VALUE if it is known".to_owned(),
+                    cause: if drawn < low {
+                        "the steering wheel turns between the hands and the sensor (a torsion bar below the wheel), or a \
+                         torque is late"
+                            .to_owned()
+                    } else {
+                        "a torque sensor is filtered or late, or the driver is another one".to_owned()
+                    },
+                    cure: if drawn < low {
+                        "--wheel-inertia J with the wheel's inertia, kg.m2 (0.03 to 0.05 is usual); --fix t_nms=VALUE if it \
+                         is known"
+                            .to_owned()
+                    } else {
+                        "--estimate t_d_late or t_h_late; --fix t_nms=VALUE if it is known".to_owned()
+                    },
                 };
-                out.push(((beyond / error).powi(2), refutation));
+                out.push(((beyond / error).powi(2).max(REFUTES), refutation));
             }
         }
         out

@@ -9,7 +9,10 @@ use nalgebra::{DMatrix, DVector};
 use super::delays::filter;
 use super::sums::Rows;
 use super::uncertainty::{ActiveBounds, Uncertainty};
-use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, RHO, T_NMS, T_P, THETA, VARIATION_WIDTHS};
+use super::{
+    BEND_RAD_S, COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P,
+    THETA, VARIATION_WIDTHS,
+};
 use crate::identify::balance::balance;
 use crate::identify::diagnostics;
 use crate::identify::log::DriveLog;
@@ -17,7 +20,8 @@ use crate::identify::options::{FixError, Options};
 use crate::identify::paper::TABLE_4;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::{
-    Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant, Start, Traces,
+    Combination, Correlation, Identification, InputCorrelation, OwnLine, Parameter, Parameters, Remnant,
+    Start, Traces,
 };
 use crate::identify::search::{Bounds, Optimum};
 
@@ -26,6 +30,7 @@ struct Named {
     parameters: Parameters,
     /// What the muscle and the delays of the sensors came to, where they were estimated.
     beyond: Vec<(&'static str, Parameter)>,
+    line: OwnLine,
     /// Why the gains could not be split, if they could not.
     not_split: Option<FixError>,
 }
@@ -39,10 +44,11 @@ impl Problem<'_> {
         starts: Vec<Start>,
     ) -> Identification {
         let (log, p) = (&prepared.log, &optimum.point);
-        let (found, kept) = self.uncertainty(prepared, options, optimum);
+        let (found, kept) = self.uncertainty(prepared, optimum);
         let Named {
             parameters,
             beyond,
+            line,
             not_split,
         } = self.named_parameters(p, options, &found);
         let balance = balance(log, &prepared.stretches, options.manual);
@@ -64,7 +70,7 @@ impl Problem<'_> {
             fit_percent_predicted: Some(fit(&predicted)),
             fit_percent_wheel_angle: None,
             parameters,
-            at_t_nms: found.at_t_nms,
+            at_t_nms: found.at_t_nms.clone(),
             combinations,
             correlation: Correlation::new(&NAMES, &found.errors, &found.free),
             remnant: Some(remnant(p[RHO], p[THETA], found.variance, self.signals.dt_s)),
@@ -72,11 +78,12 @@ impl Problem<'_> {
             input_correlation: self.input_correlation(log, p, &traces),
             preflight: Some(prepared.preflight.clone()),
             balance,
-            constancy: found.constancy,
-            delay_profile: found.delay_profile,
+            constancy: found.constancy.clone(),
+            delay_profile: found.delay_profile.clone(),
             refuted: Vec::new(),
             assumed: Vec::new(),
             beyond,
+            line: Some(line),
             starts,
             loss_history: optimum.history.clone(),
             termination: optimum.termination,
@@ -84,13 +91,7 @@ impl Problem<'_> {
             notes,
             traces,
         };
-        self.judge(
-            &mut identification,
-            options,
-            optimum,
-            &found.alternatives,
-            &found.errors,
-        );
+        self.judge(&mut identification, options, optimum, &found.doubts());
         identification
     }
 
@@ -148,8 +149,35 @@ impl Problem<'_> {
         Named {
             parameters,
             beyond: beyond.collect(),
+            line: OwnLine {
+                offset: self
+                    .own_line(OWN_OFFSET, found)
+                    .unwrap_or_else(|| parameter(OWN_OFFSET)),
+                bend: self
+                    .own_line(OWN_BEND, found)
+                    .unwrap_or_else(|| parameter(OWN_BEND))
+                    .scaled(BEND_RAD_S),
+            },
             not_split: split.err(),
         }
+    }
+
+    /// What the record says of a line that it does not show, beside what is known of it; none of one that is estimated or given.
+    fn own_line(&self, place: usize, found: &Uncertainty) -> Option<Parameter> {
+        let known = self.assumed.iter().find(|a| a.place == place)?;
+        let Some(a) = found.alternatives.iter().find(|a| a.place == place) else {
+            return Some(Parameter::not_identified(known.value, Bounds::FREE));
+        };
+        let share = known.sd.powi(2) / (known.sd.powi(2) + a.error.powi(2));
+        let (step, variance) = (a.step * share, a.error.powi(2) * share);
+        Some(Parameter::estimated(
+            step,
+            0.0,
+            variance,
+            0.0,
+            Bounds::FREE,
+            VARIATION_WIDTHS[place],
+        ))
     }
 
     /// The combinations that are determined where K_hg alone is not.

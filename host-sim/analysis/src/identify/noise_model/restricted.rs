@@ -9,11 +9,9 @@
 
 use nalgebra::DMatrix;
 
-use super::{COUNT, Problem, RHO, T_P, THETA, TOLERANCE};
+use super::{COUNT, DRIVER, Problem, RHO, THETA, TOLERANCE};
 use crate::identify::search::{Bounds, Optimum, minimise, step};
 
-/// What the driver's torque is regressed on: the gains, K_hg and, to first order, t_p.
-const REGRESSORS: usize = T_P + 1;
 /// Step in ln(1 - rho) of the parabola through the criterion: about two of its standard errors.
 const STEP: f64 = 0.1;
 /// rho outside of these is no driver's remnant: interpolation, or a walk.
@@ -55,11 +53,11 @@ impl Problem<'_> {
     fn restricted(&self, p: &[f64], rho: f64) -> f64 {
         let mut point = p.to_vec();
         point[RHO] = rho;
-        let q = self.light_sums(&point, true);
+        let q = self.driver_sums(&point);
         let d = step(&point, &self.bounds, &q, 0.0);
         let loss = q.loss + q.gradient.dot(&d) + 0.5 * d.dot(&(&q.hessian * &d));
         let free: Vec<usize> = (0..self.size())
-            .filter(|i| !(REGRESSORS..COUNT).contains(i))
+            .filter(|i| !(DRIVER..COUNT).contains(i))
             .filter(|&i| self.is_free(i) && !self.bounds[i].touches(p[i]) && q.hessian[(i, i)] > 0.0)
             .collect();
         let k = free.len();

@@ -1,284 +1,221 @@
-//! The rows of the loss, in blocks that the processor's wide registers are filled with: prediction errors, their
-//! derivatives, and the products of those. What is made of them is in [`super::sums`].
+//! The rows of the loss, block by block: prediction errors and their negative derivatives, side by side.
 //!
-//! Columns lie side by side in a row, all through the filter of the disturbance, `(1 - rho/q)/(1 - theta/q)`: eight, or
-//! sixteen where what is usually known of muscle and sensors has its derivatives too. They are the negative derivatives
-//! by the parameters and, behind them, by the stretch's constant.
-//!
-//! The filter starts as if the first row of a stretch had gone on for ever: for the slow signals here that is nearer to
-//! the truth than silence, and the first innovation is not the whole disturbance.
+//! All columns have gone through the filter of the disturbance, `(1 - rho/q)/(1 - theta/q)`. They are the negative
+//! derivatives by the first parameters, in their order, and behind them that by the stretch's constant. The filter starts
+//! as if the first row of a stretch had gone on for ever: for the slow signals here that is nearer to the truth than
+//! silence, and the first innovation is not the whole disturbance. What is made of the rows is in [`super::sums`].
 
 use std::ops::Range;
 
-use multiversion::multiversion;
+use super::delays::Line;
+use super::{
+    CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P, THETA, at,
+};
+use crate::identify::signals::Delay;
+use crate::identify::wide::BLOCK;
 
-use super::{CORE, COUNT, K_HG, RHO, T_P, THETA, at};
-use crate::identify::signals::{Delay, Signals};
-use crate::identify::wide::{BLOCK, window};
-
-/// Columns side by side, as many as registers hold, for [`CORE`] and for all parameters.
-pub(super) const FEW: usize = 8;
-pub(super) const MANY: usize = 16;
-
-/// Sums of products of columns; those with the column's own number or a lower one count.
-pub(super) type Gram<const L: usize> = [[f64; L]; L];
-
-// What is compiled for several processors has plain loops: iterators and closures would stay calls there.
+/// A block of rows; what lies behind its `count` rows is zero. The last of the columns is the constant's.
+pub(super) struct Block<const N: usize> {
+    pub(super) count: usize,
+    pub(super) columns: [[f64; BLOCK]; N],
+    pub(super) errors: [f64; BLOCK],
+    /// The disturbance before the filter.
+    pub(super) disturbance: [f64; BLOCK],
+}
 
 /// A point of the search, for the rows of one stretch.
-pub(super) struct Point {
-    pub(super) delay: Delay,
-    pub(super) gains: [f64; 3],
-    pub(super) k_hg: f64,
-    pub(super) k_nms: f64,
+struct Point<'a> {
+    p: &'a [f64],
+    delay: Delay,
+    line: Line,
     /// By how many rows T_h and the wheel angle are read later.
-    pub(super) late: [f64; 2],
-    pub(super) rho: f64,
-    pub(super) theta: f64,
-    pub(super) constant: f64,
+    late: [f64; 2],
+    constant: f64,
 }
 
-/// Regressors and disturbance of the rows of a block, before the filter.
-pub(super) struct Block {
-    visual: [[f64; BLOCK]; 3],
-    guidance: [f64; BLOCK],
-    by_delay: [f64; BLOCK],
-    pub(super) disturbance: [f64; BLOCK],
-    wheel: [f64; BLOCK],
-    /// The arm's torque.
-    arm: [f64; BLOCK],
-    /// Derivatives by K_nms, t_nms and the delays of T_h and T_d.
-    sensors: [[f64; BLOCK]; 4],
+/// What the filter remembers.
+struct Memory<const N: usize> {
+    state: [f64; N],
+    last: [f64; N],
+    error: f64,
+    disturbance: f64,
 }
 
-impl Block {
+impl<const N: usize> Block<N> {
     pub(super) const EMPTY: Self = Self {
-        visual: [[0.0; BLOCK]; 3],
-        guidance: [0.0; BLOCK],
-        by_delay: [0.0; BLOCK],
+        count: 0,
+        columns: [[0.0; BLOCK]; N],
+        errors: [0.0; BLOCK],
         disturbance: [0.0; BLOCK],
-        wheel: [0.0; BLOCK],
-        arm: [0.0; BLOCK],
-        sensors: [[0.0; BLOCK]; 4],
     };
 
-    #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "see above")]
-    fn fill(&mut self, s: &Signals, p: &Point, rows: Range<usize>) {
-        let first = rows.start;
-        let mut slopes = [[0.0; BLOCK]; 3];
-        for i in 0..3 {
-            p.delay
-                .read_block(&s.visual[i], first, &mut self.visual[i], &mut slopes[i]);
+    /// Derivatives by what is always searched, and the disturbance; `arm` is the arm's torque. Plain loops over whole blocks, which
+    /// the compiler makes wide; what lies behind the last row is cut off by the filter.
+    fn fill(
+        &mut self,
+        problem: &Problem<'_>,
+        point: &Point<'_>,
+        rows: &Range<usize>,
+        arm: &mut [f64; BLOCK],
+    ) {
+        let (s, p, first) = (&problem.signals, point.p, rows.start);
+        let mut value = [[0.0; BLOCK]; 5];
+        let mut slope = [[0.0; BLOCK]; 5];
+        let seen = s.visual.iter().chain(&s.road);
+        for ((u, value), slope) in seen.zip(&mut value).zip(&mut slope) {
+            point.delay.read_block(u, first, value, slope);
         }
-        let mut spare = [[0.0; BLOCK]; 3];
-        let [spare_0, spare_1, spare_2] = &mut spare;
-        let guidance = window(&s.guidance, first, spare_0);
-        let wheel = window(&s.wheel.lagged, first, spare_1);
-        let torque = window(&s.torque, first, spare_2);
+        let ([e_y, whole, e_theta, turn, heading], bend) = (&mut value, p[OWN_BEND]);
+        let [e_y_late, whole_late, e_theta_late, turn_late, heading_late] = &slope;
+        let [mut guidance, mut wheel, mut time, mut torque] = [[0.0; BLOCK]; 4];
+        self.count = rows.len();
+        for i in 0..self.count {
+            guidance[i] = -read(&s.guidance, first + i, point.late[0]);
+            wheel[i] = -read(&s.wheel.lagged, first + i, point.late[1]);
+            torque[i] = s.torque[first + i];
+        }
+        let mut by_delay = [0.0; BLOCK];
+        let (mut by_offset, mut by_bend) = ([0.0; BLOCK], [0.0; BLOCK]);
         for i in 0..BLOCK {
-            self.guidance[i] = -guidance[i];
-            self.wheel[i] = -wheel[i];
+            time[i] = (first + i) as f64 * s.dt_s;
+            e_y[i] += bend * turn[i];
+            whole[i] += p[OWN_OFFSET] * time[i] + bend * heading[i];
+            arm[i] = p[0] * e_y[i]
+                + p[1] * whole[i]
+                + p[2] * e_theta[i]
+                + p[K_HG] * guidance[i]
+                + p[K_NMS] * wheel[i];
+            self.disturbance[i] = torque[i] - arm[i] - point.constant;
+            by_delay[i] = p[0] * (e_y_late[i] + bend * turn_late[i])
+                + p[1] * (whole_late[i] + bend * heading_late[i])
+                + p[2] * e_theta_late[i];
         }
-        if p.late[0] != 0.0 || p.late[1] != 0.0 {
-            for i in 0..rows.end - first {
-                self.guidance[i] = -at(&s.guidance, first + i, p.late[0]);
-                self.wheel[i] = -at(&s.wheel.lagged, first + i, p.late[1]);
+        match point.line {
+            Line::Size => {
+                for i in 0..BLOCK {
+                    by_offset[i] = p[1] * time[i];
+                    by_bend[i] = p[0] * turn[i] + p[1] * heading[i];
+                }
             }
+            Line::Torques => (by_offset, by_bend) = (time, *heading),
         }
-        let ([v1, v2, v3], [d1, d2, d3]) = (&self.visual, &slopes);
-        for i in 0..BLOCK {
-            let visual = p.gains[0] * v1[i] + p.gains[1] * v2[i] + p.gains[2] * v3[i];
-            self.arm[i] = visual + p.k_hg * self.guidance[i] + p.k_nms * self.wheel[i];
-            self.by_delay[i] = p.gains[0] * d1[i] + p.gains[1] * d2[i] + p.gains[2] * d3[i];
-            self.disturbance[i] = torque[i] - self.arm[i] - p.constant;
+        let row = [&*e_y, whole, e_theta, &guidance, &by_delay, &by_offset, &by_bend];
+        for (column, x) in self.columns[..N - 1].iter_mut().zip(row) {
+            *column = *x;
         }
+        self.columns[N - 1] = [1.0; BLOCK];
     }
 
     /// The derivatives by what is usually known; `slow` is the arm's torque through one more lag.
-    pub(super) fn fill_sensors(
+    fn fill_sensors(
         &mut self,
-        s: &Signals,
-        p: &Point,
-        rows: Range<usize>,
+        problem: &Problem<'_>,
+        point: &Point<'_>,
+        first: usize,
+        arm: &[f64; BLOCK],
         slow: &mut Option<f64>,
     ) {
+        let (s, p) = (&problem.signals, point.p);
         let decay = (-s.dt_s / s.t_nms_s).exp();
         let rate = |raw: f64, lagged: f64| (raw - lagged) / s.t_nms_s;
-        let [by_k_nms, by_t_nms, by_h_late, by_d_late] = &mut self.sensors;
-        for (i, k) in rows.enumerate() {
-            let h_rate = p.k_hg * rate(s.guidance_raw[k], s.guidance[k]);
-            let w_rate = p.k_nms * rate(s.wheel.raw[k], s.wheel.lagged[k]);
-            let arm = self.arm[i];
-            let lagged = slow.map_or(arm, |slow| decay * slow + (1.0 - decay) * arm);
+        for i in 0..self.count {
+            let k = first + i;
+            let h_rate = p[K_HG] * rate(s.guidance_raw[k], s.guidance[k]);
+            let w_rate = p[K_NMS] * rate(s.wheel.raw[k], s.wheel.lagged[k]);
+            let lagged = slow.map_or(arm[i], |slow| decay * slow + (1.0 - decay) * arm[i]);
             *slow = Some(lagged);
-            by_k_nms[i] = self.wheel[i];
-            by_t_nms[i] = -rate(arm, lagged);
-            by_h_late[i] = -h_rate;
-            by_d_late[i] = self.by_delay[i] + h_rate + w_rate;
+            self.columns[K_NMS][i] = -read(&s.wheel.lagged, k, point.late[1]);
+            self.columns[T_NMS][i] = -rate(arm[i], lagged);
+            self.columns[H_LATE][i] = -h_rate;
+            self.columns[D_LATE][i] = self.columns[T_P][i] + h_rate + w_rate;
         }
     }
 
-    /// What a row's columns have in common.
-    #[inline(always)]
-    fn driver(&self, k: usize) -> [f64; 5] {
-        let [v1, v2, v3] = &self.visual;
-        [v1[k], v2[k], v3[k], self.guidance[k], self.by_delay[k]]
-    }
-}
-
-/// What the filters remember, and what they made of the last block.
-pub(super) struct Filtered<const L: usize> {
-    pub(super) begun: bool,
-    state: [f64; L],
-    /// What went in before.
-    last: [f64; L],
-    error: f64,
-    last_disturbance: f64,
-    pub(super) columns: [[f64; L]; BLOCK],
-    pub(super) errors: [f64; BLOCK],
-}
-
-impl<const L: usize> Filtered<L> {
-    pub(super) const SILENT: Self = Self {
-        begun: false,
-        state: [0.0; L],
-        last: [0.0; L],
-        error: 0.0,
-        last_disturbance: 0.0,
-        columns: [[0.0; L]; BLOCK],
-        errors: [0.0; BLOCK],
-    };
-
-    /// A row of regressors: zero where the derivative is not one of the row alone.
-    #[inline(always)]
-    fn regressors(block: &Block, k: usize) -> [f64; L] {
-        let mut out = [0.0; L];
-        [out[0], out[1], out[2], out[K_HG], out[T_P]] = block.driver(k);
-        if L == MANY {
-            for i in 0..COUNT - CORE {
-                out[CORE + i] = block.sensors[i][k];
-            }
-            out[COUNT] = 1.0;
-        } else {
-            out[CORE] = 1.0;
-        }
-        out
-    }
-
-    #[inline(always)]
-    fn filter(&mut self, p: &Point, block: &Block, count: usize) {
-        let (rho, theta) = (p.rho, p.theta);
-        if !self.begun {
-            self.begun = true;
+    fn filter(&mut self, rho: f64, theta: f64, memory: &mut Option<Memory<N>>) {
+        // Those of the disturbance are derivatives of the filter itself.
+        let of_filter = |i: usize| i + 1 < N && (RHO..CORE).contains(&i);
+        let rho_of: [f64; N] = std::array::from_fn(|i| if of_filter(i) { 0.0 } else { rho });
+        let Memory {
+            mut state,
+            mut last,
+            mut error,
+            mut disturbance,
+        } = memory.take().unwrap_or_else(|| {
             let gain = (1.0 - rho) / (1.0 - theta);
-            self.last = Self::regressors(block, 0);
-            for i in 0..L {
-                self.state[i] = gain * self.last[i];
+            let last: [f64; N] = std::array::from_fn(|i| if of_filter(i) { 0.0 } else { self.columns[i][0] });
+            Memory {
+                state: last.map(|x| gain * x),
+                last,
+                error: gain * self.disturbance[0],
+                disturbance: self.disturbance[0],
             }
-            self.last_disturbance = block.disturbance[0];
-            self.error = gain * self.last_disturbance;
-        }
-        let (mut state, mut last) = (self.state, self.last);
-        let (mut error, mut before) = (self.error, self.last_disturbance);
-        for k in 0..count {
-            let now = Self::regressors(block, k);
-            let mut new = now;
-            new[RHO] = before;
-            new[THETA] = -error;
-            for i in 0..L {
-                state[i] = theta * state[i] + (new[i] - rho * last[i]);
+        });
+        for k in 0..self.count {
+            if N > CORE {
+                self.columns[RHO][k] = disturbance;
+                self.columns[THETA][k] = -error;
             }
-            last = now;
-            error = theta * error + (block.disturbance[k] - rho * before);
-            before = block.disturbance[k];
-            self.columns[k] = state;
+            for i in 0..N {
+                let now = self.columns[i][k];
+                state[i] = theta * state[i] + (now - rho_of[i] * last[i]);
+                last[i] = now;
+                self.columns[i][k] = state[i];
+            }
+            error = theta * error + (self.disturbance[k] - rho * disturbance);
+            disturbance = self.disturbance[k];
             self.errors[k] = error;
         }
-        (self.state, self.last) = (state, last);
-        (self.error, self.last_disturbance) = (error, before);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn fill(s: &Signals, p: &Point, rows: Range<usize>, block: &mut Block) {
-    block.fill(s, p, rows);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn filter_block<const L: usize>(p: &Point, block: &Block, count: usize, out: &mut Filtered<L>) {
-    out.filter(p, block, count);
-}
-
-/// Adds the products of some of the columns, numbers `FROM` to `TO`, with the first `WIDTH`: as many sums as the registers
-/// hold.
-#[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "see above")]
-fn products<const L: usize, const FROM: usize, const TO: usize, const WIDTH: usize>(
-    gram: &mut Gram<L>,
-    rows: &[[f64; L]],
-) {
-    let mut sums = [[0.0; WIDTH]; L];
-    for i in FROM..TO {
-        for j in 0..WIDTH {
-            sums[i][j] = gram[i][j];
+        *memory = Some(Memory {
+            state,
+            last,
+            error,
+            disturbance,
+        });
+        for column in self.columns.iter_mut().chain([&mut self.errors]) {
+            column[self.count..].fill(0.0);
         }
     }
-    for k in 0..rows.len() {
-        let row = &rows[k];
-        for i in FROM..TO {
-            for j in 0..WIDTH {
-                sums[i][j] += row[i] * row[j];
+}
+
+/// `u` at row `k`, read so many rows later.
+fn read(u: &[f64], k: usize, late: f64) -> f64 {
+    if late == 0.0 { u[k] } else { at(u, k, late) }
+}
+
+impl Problem<'_> {
+    fn point<'a>(&self, p: &'a [f64], stretch: usize, line: Line) -> Point<'a> {
+        let dt_s = self.signals.dt_s;
+        Point {
+            p,
+            line,
+            // T_d is recorded late: all that it answers to is as much longer ago.
+            delay: self.signals.delay((p[T_P] + p[D_LATE]).max(0.0)),
+            late: [(p[H_LATE] - p[D_LATE]) / dt_s, -p[D_LATE] / dt_s],
+            constant: p[COUNT + stretch],
+        }
+    }
+
+    /// Hands each block of rows at `p`, with the number of its stretch, to `visit`.
+    pub(super) fn walk<const N: usize>(
+        &self,
+        p: &[f64],
+        line: Line,
+        mut visit: impl FnMut(usize, &Block<N>),
+    ) {
+        let mut block = Block::EMPTY;
+        let mut arm = [0.0; BLOCK];
+        for (number, stretch) in self.stretches.iter().enumerate() {
+            let point = self.point(p, number, line);
+            let (mut memory, mut slow) = (None, None);
+            for first in stretch.clone().step_by(BLOCK) {
+                let rows = first..(first + BLOCK).min(stretch.end);
+                block.fill(self, &point, &rows, &mut arm);
+                if N > COUNT {
+                    block.fill_sensors(self, &point, first, &arm, &mut slow);
+                }
+                block.filter(p[RHO], p[THETA], &mut memory);
+                visit(number, &block);
             }
         }
     }
-    for i in FROM..TO {
-        for j in 0..WIDTH {
-            gram[i][j] = sums[i][j];
-        }
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_products<const L: usize>(gram: &mut Gram<L>, rows: &[[f64; L]]) {
-    products::<L, 0, 4, 4>(gram, rows);
-    products::<L, 4, 6, 8>(gram, rows);
-    products::<L, 6, 8, 8>(gram, rows);
-    if L == MANY {
-        products::<L, 8, 10, 12>(gram, rows);
-        products::<L, 10, 12, 12>(gram, rows);
-    }
-}
-
-/// The errors' squares, and their products with the columns.
-#[derive(Clone, Copy)]
-pub(super) struct OfErrors<const L: usize> {
-    pub(super) squares: f64,
-    pub(super) by_column: [f64; L],
-}
-
-impl<const L: usize> OfErrors<L> {
-    pub(super) const NONE: Self = Self {
-        squares: 0.0,
-        by_column: [0.0; L],
-    };
-
-    #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "see above")]
-    fn add(&mut self, rows: &Filtered<L>, count: usize) {
-        let mut here = *self;
-        for k in 0..count {
-            let (row, e) = (&rows.columns[k], rows.errors[k]);
-            here.squares += e * e;
-            for i in 0..L {
-                here.by_column[i] += e * row[i];
-            }
-        }
-        *self = here;
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_errors<const L: usize>(to: &mut OfErrors<L>, rows: &Filtered<L>, count: usize) {
-    to.add(rows, count);
 }

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::delays::Line;
 use super::evidence::Alternative;
 use super::sums::Rows;
-use super::{COUNT, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS};
+use super::{COUNT, DRIVER, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS};
 use crate::identify::change::Constancy;
-use crate::identify::options::Options;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::AtTNms;
 use crate::identify::search::{Optimum, covariance};
@@ -34,10 +34,27 @@ pub(super) struct Uncertainty {
     pub(super) unbiased: Vec<f64>,
     pub(super) active: ActiveBounds,
     pub(super) constancy: Option<Constancy>,
-    /// How far another t_nms moves each estimate.
+    /// How far what the record says of the muscle moves each estimate.
     pub(super) drawn: DVector<f64>,
-    /// The intervals at the assumed t_nms, if t_nms is not known.
+    /// The intervals if all is as assumed, if that is not known.
     pub(super) at_t_nms: Option<AtTNms>,
+}
+
+/// What the verdict is made of beside the results.
+pub(super) struct Doubts<'a> {
+    pub(super) alternatives: &'a [Alternative],
+    pub(super) errors: &'a DMatrix<f64>,
+    pub(super) active: &'a ActiveBounds,
+}
+
+impl Uncertainty {
+    pub(super) fn doubts(&self) -> Doubts<'_> {
+        Doubts {
+            alternatives: &self.alternatives,
+            errors: &self.errors,
+            active: &self.active,
+        }
+    }
 }
 
 /// What the driver's bounds did to the optimum.
@@ -52,12 +69,7 @@ pub(super) struct ActiveBounds {
 
 impl Problem<'_> {
     /// The errors of an optimum, and its rows.
-    pub(super) fn uncertainty(
-        &self,
-        prepared: &Prepared,
-        options: &Options,
-        optimum: &Optimum,
-    ) -> (Uncertainty, Rows) {
+    pub(super) fn uncertainty(&self, prepared: &Prepared, optimum: &Optimum) -> (Uncertainty, Rows) {
         let p = &optimum.point;
         // A disturbance on its bound (no sensor noise, say) is taken as known: only the driver's own bounds may
         // have held the estimate back.
@@ -78,7 +90,7 @@ impl Problem<'_> {
             error_variance,
             errors[(T_P, T_P)].sqrt(),
         );
-        let kept = self.kept_rows(p);
+        let kept = self.kept_rows(p, Line::Size);
         self.widen(
             &mut errors,
             p,
@@ -108,11 +120,11 @@ impl Problem<'_> {
         let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian, &kept);
         let active = self.active_bounds(optimum, &free, &errors, error_variance);
         errors += doubted.covariance(self.size());
-        let constancy = self.constancy(p, &kept, error_variance, &mut errors);
+        let constancy = self.constancy(p, error_variance, &mut errors);
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
-        if !options.t_nms_known && !self.is_free(T_NMS) {
-            at_t_nms = Some(self.at_t_nms(&unbiased, &errors, &active.pull));
-            drawn = self.widen_by_t_nms(&mut errors, &alternatives, drawn_with.as_ref());
+        if self.assumed.iter().any(|a| !self.is_free(a.place)) {
+            at_t_nms = Some(self.as_assumed(&unbiased, &errors, &active.pull));
+            drawn = self.widen_by_assumed(&mut errors, &alternatives, drawn_with.as_ref());
         }
         let found = Uncertainty {
             variance,
@@ -133,7 +145,7 @@ impl Problem<'_> {
     fn unbiased(&self, p: &[f64], estimated: &[usize], hessian: &DMatrix<f64>, rows: &Rows) -> Vec<f64> {
         let bias = self.bias(rows, &covariance(hessian, estimated));
         let mut out = p.to_vec();
-        for i in estimated.iter().copied().filter(|&i| i <= T_P) {
+        for i in estimated.iter().copied().filter(|&i| i < DRIVER) {
             out[i] = (p[i] - bias[i]).clamp(self.bounds[i].low, self.bounds[i].high);
         }
         out

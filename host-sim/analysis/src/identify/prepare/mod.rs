@@ -19,6 +19,7 @@ pub use stretches::{LeftOut, Reason};
 use super::lane::{LaneDoubt, LaneNoise, Smoothed, smooth};
 use super::log::{COLUMNS, DriveLog};
 use super::options::Options;
+use super::wheel::add_wheel;
 
 /// Changes of e_y, e_theta, wheel angle, T_h and T_d below which a sample is never out of line: m, rad, rad, N.m, N.m.
 const LEAST: [f64; 5] = [5e-3, 5e-4, 1e-2, 0.06, 0.06];
@@ -165,7 +166,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         lane_doubts.extend(s.doubts.into_iter().map(doubt));
         s.signal
     };
-    let clean = DriveLog {
+    let mut clean = DriveLog {
         start_s: log.start_s,
         dt_s: dt,
         e_y_m: take(y, e_y.signal, 0),
@@ -178,6 +179,9 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         speeds_m_per_s: log.speeds_m_per_s,
         findings: Vec::new(),
     };
+    if let Some(inertia) = options.wheel_inertia {
+        add_wheel(&mut clean.driver_torque_nm, &clean.wheel_angle_rad, dt, inertia);
+    }
     preflight.lane_noise = lane_noise;
     let (stretches, left_out) = stretches::stretches(log, &clean, &bad, lane_noise, options);
     preflight.left_out = left_out;

@@ -115,7 +115,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
 /// A value and its interval.
 type Known = fn(&Drives) -> (Option<f64>, Option<[f64; 2]>);
 
-/// Of all drives, or of those with each value of the field that is compared; and the best levels.
+/// Series of all drives, or of those with each value of the field that is compared; and the best levels.
 fn series(summary: &Summary, effect: &Effect, places: &[f64], joined: bool, known: Known) -> Vec<Series> {
     let line = |label: &str, style: usize, values: Vec<(f64, Option<&Drives>)>| {
         let known = |(x, drives): (f64, Option<&Drives>)| {

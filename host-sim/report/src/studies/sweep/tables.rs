@@ -4,7 +4,7 @@ use super::words::{OWN_UNIT, by_weight, decimals, heading, label, lower, metric}
 use crate::document::{Cell, Table};
 use haptic_batch::sweep::{Distribution, Effect, Level, SobolIndex, Summary, Sweep, Worst};
 
-/// Of distributions and of what is compared a terminal shows the fields that matter most.
+/// A terminal shows so many of the fields that matter most, of distributions and of what is compared.
 const SHOWN: usize = 2;
 
 /// Distributions, shares of the variance, Sobol indices, levels, what is compared, the worst drives: in this order, some

@@ -1,0 +1,236 @@
+//! Drivers of a known truth, recorded as the cars of others record real people: slowly, with lane lines that are noisy, a torque in
+//! steps and a torsion bar that feels the wheel's inertia. Read by the layout `openlka`, what is made of them?
+//!
+//! The lines differ in one property each, so that they tell what makes K_hg identifiable on a road.
+
+use std::fmt::Write as _;
+
+use haptic_analysis::identify::{
+    Identification, Layout, Options, Recording, Traces, identify_with_noise_model, of_bytes,
+};
+use haptic_log::formats::Format;
+use haptic_log::trace::Trace;
+use haptic_sim::simulation;
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand_distr::{Distribution, Normal};
+
+use super::corruptions::{CorruptionLine, Corruptions, Held};
+use haptic_batch::StudyError;
+use haptic_batch::engine::{Watch, each};
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_batch::experiment::{COMPARED, Compared, compared};
+use haptic_batch::experiment::{guided, scenario_of_drive};
+
+/// How a drive is recorded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Channel {
+    /// Rows a second.
+    pub rate_hz: f64,
+    /// From the drive's 60th second on, s.
+    pub length_s: f64,
+    /// Whether the guidance holds the probe.
+    pub probe: bool,
+    /// Moment of inertia of the wheel, which lies between the hands and the torsion bar, kg.m2. Zero: the hands' torque.
+    pub wheel_kg_m2: f64,
+    /// Standard deviation of each lane line, m.
+    pub line_noise_m: f64,
+}
+
+const ROAD: Channel = Channel {
+    rate_hz: 10.0,
+    length_s: 60.0,
+    probe: false,
+    wheel_kg_m2: 0.04,
+    line_noise_m: 0.02,
+};
+const LONG: Channel = Channel {
+    length_s: 130.0,
+    ..ROAD
+};
+const PROBED: Channel = Channel { probe: true, ..LONG };
+const FAST: Channel = Channel {
+    rate_hz: 100.0,
+    ..PROBED
+};
+
+/// The channels, with what each is.
+pub const CHANNELS: [(&str, Channel); 9] = [
+    ("10 Hz, 60 s, no probe, torsion bar", ROAD),
+    ("10 Hz, 130 s, no probe, torsion bar", LONG),
+    ("10 Hz, 60 s, probe, torsion bar", Channel { probe: true, ..ROAD }),
+    ("10 Hz, 130 s, probe, torsion bar", PROBED),
+    (
+        "10 Hz, 130 s, probe, torque of the hands",
+        Channel {
+            wheel_kg_m2: 0.0,
+            ..PROBED
+        },
+    ),
+    (
+        "20 Hz, 130 s, probe, torque of the hands",
+        Channel {
+            rate_hz: 20.0,
+            wheel_kg_m2: 0.0,
+            ..FAST
+        },
+    ),
+    ("100 Hz, 130 s, probe, torsion bar", FAST),
+    (
+        "100 Hz, 130 s, probe, torque of the hands",
+        Channel {
+            wheel_kg_m2: 0.0,
+            ..FAST
+        },
+    ),
+    (
+        "100 Hz, 130 s, probe, torque of the hands, lines without noise",
+        Channel {
+            wheel_kg_m2: 0.0,
+            line_noise_m: 0.0,
+            ..FAST
+        },
+    ),
+];
+
+/// Records the guided drives of `plan` with `seeds` seeds from its own on by each of [`CHANNELS`], and identifies each as `identify
+/// --layout openlka` does. The corruptions of the result are the channels; no
+/// information bound is given for them.
+///
+/// # Errors
+/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
+pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Result<Corruptions, StudyError> {
+    let layout = Layout::named("openlka")?;
+    let jobs = guided(plan, seeds)?;
+    let found = each(&jobs, watch, |&(number, truth, seed)| {
+        let drive = |probe_nm| {
+            let plan = ExperimentPlan {
+                seed: plan.seed.wrapping_add(seed),
+                probe_nm,
+                ..plan.clone()
+            };
+            let scenario = scenario_of_drive(&plan, number, &truth, truth.parameters())?;
+            Ok::<_, StudyError>(simulation::simulate(&scenario).trace)
+        };
+        let drives = [drive(0.0)?, drive(plan.probe_nm)?];
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(
+            plan.seed
+                .wrapping_add(seed)
+                .wrapping_mul(100)
+                .wrapping_add(u64::from(number)),
+        );
+        let fit = |(_, channel): &(&str, Channel)| {
+            let bytes = channel.record(&drives[usize::from(channel.probe)], &mut random);
+            let fit = identified(bytes, &layout);
+            fit.map(|fit| (compared(&truth, &fit.parameters), fit))
+        };
+        Ok(CHANNELS.iter().map(fit).collect::<Vec<_>>())
+    })?;
+    let lines = CHANNELS.iter().enumerate().map(|(k, (name, _))| {
+        let fits: Vec<([Compared; COMPARED], Identification)> =
+            found.iter().filter_map(|each| each[k].clone()).collect();
+        CorruptionLine::new(name, &fits)
+    });
+    let mut found = Corruptions::new(plan, seeds, lines.collect(), [f64::NAN; COMPARED]);
+    let all = found
+        .intervals
+        .iter()
+        .fold(Held::default(), |sum, held| sum + *held);
+    // Fewer do not tell 95 from 100 %.
+    let told = all.share().filter(|_| all.identified >= 100);
+    if let Some(share) = told.filter(|share| !(0.93..=0.97).contains(share)) {
+        found.broken.push(format!(
+            "the 95 % intervals of {} identified values hold the truth in {:.1} %, 93 to 97 are wanted",
+            all.identified,
+            100.0 * share
+        ));
+    }
+    Ok(found)
+}
+
+/// None if the layout refuses the recording.
+fn identified(bytes: Vec<u8>, layout: &Layout) -> Option<Identification> {
+    let how = Recording::default();
+    let (log, _) = of_bytes(bytes, Some(Format::Csv), Some(layout), &[], &how).ok()?;
+    let mut fit = identify_with_noise_model(&log, &Options::default());
+    fit.traces = Traces::default();
+    Some(fit)
+}
+
+impl Channel {
+    /// A drive as this car writes it, with openpilot's names and signs.
+    fn record(&self, drive: &Trace, random: &mut Xoshiro256PlusPlus) -> Vec<u8> {
+        let mut text = String::from(
+            "Time,op_lat_enable,vEgo,aEgo,latOutput,op_curvature_desired,op_curvature_actual,op_state_steer_torque,\
+             op_state_steer_angle,op_left_laneline,op_right_laneline\n",
+        );
+        let Ok(noise) = Normal::new(0.0, self.line_noise_m) else {
+            unreachable!("the deviations are constants of 0 m and more")
+        };
+        let samples = &drive.samples;
+        let every = (drive.sample_rate_hz / self.rate_hz).round() as usize;
+        let first = (60.0 * drive.sample_rate_hz) as usize;
+        let rows = (self.length_s * self.rate_hz) as usize;
+        let places = (0..rows).map(|row| first + row * every);
+        for k in places.take_while(|k| k + 1 < samples.len()) {
+            let now = &samples[k];
+            let acceleration = 0.5
+                * drive.sample_rate_hz
+                * (samples[k + 1].wheel_rate_rad_per_s - samples[k - 1].wheel_rate_rad_per_s);
+            // Torque in steps of 0.01 N.m, angle of 1/16 deg.
+            let torque = 0.01 * (100.0 * (now.driver_torque_nm - self.wheel_kg_m2 * acceleration)).round();
+            let angle = (16.0 * now.wheel_angle_rad.to_degrees()).round() / 16.0;
+            let [left, right] = [-1.8, 1.8].map(|line| now.lateral_error_m + line + noise.sample(random));
+            let speed = now.speed_m_per_s;
+            let _ = writeln!(
+                text,
+                "{:.4},True,{speed:.4},0,{:.5},{:.7},{:.7},{torque:.2},{angle},{left:.4},{right:.4}",
+                now.time_s,
+                now.guidance_torque_nm / 3.0,
+                -now.curvature_1pm,
+                -now.yaw_rate_rad_per_s / speed,
+            );
+        }
+        text.into_bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every row of a drive that is a straight line, by hand: 1 N.m and 0.2 rad/s2 at a wheel of 0.04 kg.m2 are 0.992 N.m, which is
+    /// 0.99 in steps of 0.01; 0.1 rad are 5.7296 deg, 5.75 in steps of 1/16; lines 0.3 m to the left of the car's are at 1.8 m.
+    #[test]
+    fn a_row_is_what_the_car_would_write() {
+        let sample = |k: u32| {
+            let mut sample = haptic_log::trace::Sample::default();
+            sample.time_s = f64::from(k) / 200.0;
+            sample.wheel_angle_rad = 0.1;
+            sample.wheel_rate_rad_per_s = 0.2 * sample.time_s;
+            sample.driver_torque_nm = 1.0;
+            sample.guidance_torque_nm = 0.3;
+            sample.lateral_error_m = 0.3;
+            sample.curvature_1pm = 0.002;
+            sample.yaw_rate_rad_per_s = 0.04;
+            sample.speed_m_per_s = 20.0;
+            sample
+        };
+        let drive = Trace {
+            sample_rate_hz: 200.0,
+            samples: (0..12_400).map(sample).collect(),
+        };
+        let channel = Channel {
+            line_noise_m: 0.0,
+            ..ROAD
+        };
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let text = String::from_utf8(channel.record(&drive, &mut random)).unwrap();
+        let rows: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(rows.len(), 20, "2 s at 10 Hz");
+        assert_eq!(
+            rows[1],
+            "60.1000,True,20.0000,0,0.10000,-0.0020000,-0.0020000,0.99,5.75,-1.5000,2.1000"
+        );
+    }
+}
