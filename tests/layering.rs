@@ -69,7 +69,6 @@ const STUDIES: &[&str] = &[
     "experiment",
     "handover",
     "identify",
-    "real_drives",
     "reliance",
     "run",
     "stability",

@@ -21,7 +21,7 @@ pub(crate) const BUDGETS: [(&str, usize); 21] = [
     ("firmware/lockstep", 200),
     ("host-sim", 2_700),
     ("host-sim/analysis", 8_700),
-    ("host-sim/batch", 12_400),
+    ("host-sim/batch", 10_300),
     ("host-sim/campaign", 4_000),
     ("host-sim/evidence", 3_900),
     ("host-sim/log", 5_400),

@@ -79,7 +79,7 @@ impl<'k, P: ?Sized> Chosen<'k, P> {
         })
     }
 
-    /// This driver with other values of some parameters of what is around it.
+    /// This choice with other values of some parameters of what is around it.
     pub(crate) fn with_habit(&self, kind: &str, changed: &[(&str, f64)]) -> Self {
         let value = |p: &Parameter, value: &f64| {
             let found = changed.iter().find(|(name, _)| *name == p.name);
@@ -98,7 +98,7 @@ impl<'k, P: ?Sized> Chosen<'k, P> {
         }
     }
 
-    /// Makes it untuned, and refuses it in words that name it as the file does.
+    /// Makes it untuned; what is refused is named as the file names it.
     pub(crate) fn check(
         &self,
         what: &str,

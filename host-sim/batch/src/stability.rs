@@ -15,7 +15,7 @@ use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Scenario};
 use haptic_sim::simulation::Run;
 
 use crate::Away;
-use crate::engine::{Part, Plan, Study, Watch, each};
+use crate::engine::{Watch, each, runs};
 use crate::error::StudyError;
 use crate::paper::stretched_curve;
 use crate::record::{growth, peak_m};
@@ -95,37 +95,32 @@ impl Shares {
 /// Growths that differ by less are alike, 1/s.
 const SAME_PER_S: f64 = 0.01;
 
-/// The map of a scenario.
-pub struct Map<'a>(pub &'a Scenario);
-
-impl Study for Map<'_> {
-    type Case = (f64, f64, Condition);
-    type Row = Drive;
-    type Results = Vec<Place>;
-
-    fn plan(&self) -> Result<Plan<Self::Case>, StudyError> {
-        let places = SPEEDS_KMH.iter().flat_map(|kmh| DELAYS_S.map(|t_p| (*kmh, t_p)));
-        let cases = places.flat_map(|(kmh, t_p)| Condition::ALL.map(|condition| (kmh, t_p, condition)));
-        Ok(Plan::side_by_side(cases.collect(), self.0.seed()))
-    }
-
-    fn drive(&self, part: &Part<'_, Self::Case, Drive>) -> Result<Vec<Drive>, StudyError> {
-        part.side_by_side(
-            |(speed_kmh, t_p, condition)| at(self.0, *speed_kmh, *t_p, *condition),
-            |_, scenario, run| Ok(driven(scenario, run)),
-        )
-    }
-
-    fn summarise(&self, cases: Vec<Self::Case>, drives: Vec<Drive>) -> Result<Vec<Place>, StudyError> {
-        let each = Condition::ALL.len();
-        let places = cases.chunks(each).zip(drives.chunks(each));
-        let place = |(cases, drives): (&[Self::Case], &[Drive])| Place {
-            speed_kmh: cases[0].0,
-            t_p: cases[0].1,
-            drives: drives.to_vec(),
-        };
-        Ok(places.map(place).collect())
-    }
+/// Computes and drives every place on all cores.
+///
+/// # Errors
+/// A scenario that does not go with some place of the map.
+pub fn map(base: &Scenario, watch: &Watch<'_>) -> Result<Vec<Place>, StudyError> {
+    let places: Vec<(f64, f64)> = SPEEDS_KMH
+        .iter()
+        .flat_map(|kmh| DELAYS_S.map(|t_p| (*kmh, t_p)))
+        .collect();
+    let cases = places
+        .iter()
+        .flat_map(|place| Condition::ALL.map(|condition| (*place, condition)));
+    let drives = runs(
+        &cases.collect::<Vec<_>>(),
+        base.seed(),
+        watch,
+        |((speed_kmh, t_p), condition)| at(base, *speed_kmh, *t_p, *condition),
+        |_, scenario, run| Ok(driven(scenario, run)),
+    )?;
+    let of_places = places.iter().zip(drives.chunks(Condition::ALL.len()));
+    let place = |((speed_kmh, t_p), drives): (&(f64, f64), &[Drive])| Place {
+        speed_kmh: *speed_kmh,
+        t_p: *t_p,
+        drives: drives.to_vec(),
+    };
+    Ok(of_places.map(place).collect())
 }
 
 /// What any schedule could do, from the eigenvalues alone.
@@ -263,7 +258,7 @@ mod tests {
         let speed = Speed::by_time_kmh(vec![0.0, 10.0], &[60.0, 50.0]);
         let scenario = Scenario::builder().speed(speed).build().unwrap();
         for error in [
-            Map(&scenario).run(&Watch::nobody()).unwrap_err(),
+            map(&scenario, &Watch::nobody()).unwrap_err(),
             shares(&scenario).unwrap_err(),
         ]
         .map(|e| e.to_string())

@@ -82,7 +82,7 @@ impl Confidence {
         Normal::standard().inverse_cdf(self.upper())
     }
 
-    /// The same of Student's distribution with so many degrees of freedom; infinite with none.
+    /// How many standard deviations an interval of Student's distribution reaches with so many degrees of freedom; infinite with none.
     pub(crate) fn student(self, freedom: f64) -> f64 {
         student(self.upper(), freedom)
     }
@@ -187,7 +187,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// Of so many events of a Poisson process in so many hours.
+    /// The rate behind so many events of a Poisson process in so many hours.
     pub fn new(count: u64, hours: f64) -> Self {
         let quantile = |share: f64, degrees: u64| {
             let law = ChiSquared::new(degrees as f64).expect("positive");

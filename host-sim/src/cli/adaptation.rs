@@ -2,7 +2,6 @@
 
 use haptic_batch::adaptation::Adaptation;
 use haptic_batch::compare::Kinds;
-use haptic_batch::engine::Study;
 use haptic_report::document::write_bytes;
 use haptic_report::studies::adaptation::report;
 

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::engine::Study;
 use haptic_batch::files::load_scenario;
-use haptic_batch::stability::shares;
+use haptic_batch::stability::{map, shares};
 use haptic_report::studies::stability::{Map, report};
 
 use super::results::ResultArguments;
@@ -31,8 +30,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("stability")?;
     let named = |e| InputError::new(&name, e);
     let map = Map {
-        places: progress::watched("drives", |watch| haptic_batch::stability::Map(&base).run(watch))
-            .map_err(named)?,
+        places: progress::watched("drives", |watch| map(&base, watch)).map_err(named)?,
         shares: shares(&base).map_err(named)?,
     };
     let holds = map.places.iter().all(|place| place.broken().next().is_none());

@@ -16,7 +16,7 @@ const HELD_S: f64 = 1e6;
 
 /// A drive to be done.
 #[derive(Debug, Clone, Copy)]
-pub struct Job {
+pub(super) struct Job {
     pub(super) driver: usize,
     pub(super) seed: u32,
     pub(super) what: What,
@@ -44,7 +44,7 @@ pub struct Seen {
 
 /// What came of a drive.
 #[derive(Debug, Clone)]
-pub struct Driven {
+pub(super) struct Driven {
     pub(super) series: Vec<Seen>,
     /// Whether it left the road, or the ECU ended guidance by itself.
     pub(super) ended: bool,

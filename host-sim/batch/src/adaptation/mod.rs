@@ -27,13 +27,13 @@ use haptic_sim::input::InputError;
 use haptic_sim::laws::Law;
 use serde::Serialize;
 
-use crate::engine::{Part, Plan, Study};
+use crate::engine::{Watch, each};
 use crate::error::StudyError;
 use crate::files::Source;
 use crate::parts::{Chosen, Kinds};
 use crate::statistics::{Confidence, Mean, mean};
-use drive::What;
-pub use drive::{Driven, Job, Seen};
+pub use drive::Seen;
+use drive::{Driven, Job, What};
 pub use linear::{Swing, of_series, steepest, swings};
 
 /// Small gain with a margin of two: the largest product of slopes that a law may have with a driver.
@@ -118,7 +118,7 @@ pub struct Pair {
     pub law_slope: f64,
     /// The largest slope of the driver's map at gains that the law's map has, 1/(N.m); none where the driver has two equilibria there.
     pub driver_slope: Option<f64>,
-    /// Of both.
+    /// The product of both slopes.
     pub product: Option<f64>,
     /// K_hg before the loss, and settled behind it.
     pub k_hg: [Option<Mean>; 2],
@@ -212,6 +212,54 @@ impl<'k> Adaptation<'k> {
         (0..self.laws.len() * drivers).map(move |number| (number / drivers, number % drivers))
     }
 
+    /// Drives and sums up, on all cores.
+    ///
+    /// # Errors
+    /// As [`haptic_sim::scenario::ScenarioBuilder::build`] for a driver's parameters.
+    pub fn run(&self, watch: &Watch<'_>) -> Result<AdaptationResults, StudyError> {
+        let driven = each(&self.jobs(), watch, |job| self.driven(job))?;
+        let mut groups = driven.chunks(self.seeds as usize);
+        let mut next = || groups.next().unwrap_or_default();
+        let window = [self.times.settles_s, self.times.map_s()];
+        let mut settled = |value: fn(&Seen) -> f64, ended: &mut u32| {
+            let group = next();
+            *ended += group.iter().filter(|drive| drive.ended).count() as u32;
+            self.mean_of(group.iter().map(|drive| drive.mean(window, value)))
+        };
+        let mut ignored = 0;
+        let maps: Vec<Vec<DriverPoint>> = (self.drivers.iter())
+            .map(|_| {
+                let point = |k_1: &f64| DriverPoint {
+                    k_1: *k_1,
+                    k_hg: [(); 2].map(|()| settled(|seen| seen.k_hg, &mut ignored)),
+                };
+                self.k_1.iter().map(point).collect()
+            })
+            .collect();
+        let law_maps: Vec<(Vec<LawPoint>, u32)> = self
+            .pairs()
+            .map(|_| {
+                let mut ended = 0;
+                let point = |held: &f64| LawPoint {
+                    k_hg: *held,
+                    k_1: settled(|seen| seen.k_1, &mut ended),
+                };
+                (self.k_hg.iter().map(point).collect(), ended)
+            })
+            .collect();
+        let loops: Vec<&[Driven]> = self.pairs().map(|_| next()).collect();
+        let mut pairs = Vec::new();
+        for (((law, driver), (map, ended)), own) in self.pairs().zip(law_maps).zip(&loops) {
+            pairs.push(Pair {
+                law,
+                driver,
+                ended: ended + own.iter().filter(|drive| drive.ended).count() as u32,
+                ..self.pair(own, loops[driver], &maps[driver], map)
+            });
+        }
+        Ok(self.results(maps, pairs))
+    }
+
     /// A law with a driver, of the drives of their loop and of those under the first law.
     fn pair(&self, own: &[Driven], first: &[Driven], driver: &[DriverPoint], map: Vec<LawPoint>) -> Pair {
         let Times {
@@ -282,63 +330,6 @@ impl<'k> Adaptation<'k> {
             maps,
             pairs,
         }
-    }
-}
-
-impl Study for Adaptation<'_> {
-    type Case = Job;
-    type Row = Driven;
-    type Results = AdaptationResults;
-
-    fn plan(&self) -> Result<Plan<Job>, StudyError> {
-        Ok(Plan::one_by_one(self.jobs()))
-    }
-
-    fn drive(&self, part: &Part<'_, Job, Driven>) -> Result<Vec<Driven>, StudyError> {
-        part.one_by_one(|job| self.driven(job))
-    }
-
-    fn summarise(&self, _: Vec<Job>, driven: Vec<Driven>) -> Result<AdaptationResults, StudyError> {
-        let mut groups = driven.chunks(self.seeds as usize);
-        let mut next = || groups.next().unwrap_or_default();
-        let window = [self.times.settles_s, self.times.map_s()];
-        let mut settled = |value: fn(&Seen) -> f64, ended: &mut u32| {
-            let group = next();
-            *ended += group.iter().filter(|drive| drive.ended).count() as u32;
-            self.mean_of(group.iter().map(|drive| drive.mean(window, value)))
-        };
-        let mut ignored = 0;
-        let maps: Vec<Vec<DriverPoint>> = (self.drivers.iter())
-            .map(|_| {
-                let point = |k_1: &f64| DriverPoint {
-                    k_1: *k_1,
-                    k_hg: [(); 2].map(|()| settled(|seen| seen.k_hg, &mut ignored)),
-                };
-                self.k_1.iter().map(point).collect()
-            })
-            .collect();
-        let law_maps: Vec<(Vec<LawPoint>, u32)> = self
-            .pairs()
-            .map(|_| {
-                let mut ended = 0;
-                let point = |held: &f64| LawPoint {
-                    k_hg: *held,
-                    k_1: settled(|seen| seen.k_1, &mut ended),
-                };
-                (self.k_hg.iter().map(point).collect(), ended)
-            })
-            .collect();
-        let loops: Vec<&[Driven]> = self.pairs().map(|_| next()).collect();
-        let mut pairs = Vec::new();
-        for (((law, driver), (map, ended)), own) in self.pairs().zip(law_maps).zip(&loops) {
-            pairs.push(Pair {
-                law,
-                driver,
-                ended: ended + own.iter().filter(|drive| drive.ended).count() as u32,
-                ..self.pair(own, loops[driver], &maps[driver], map)
-            });
-        }
-        Ok(self.results(maps, pairs))
     }
 }
 

@@ -183,7 +183,7 @@ fn any_number_of_threads_gives_the_same_results() {
     let kinds = Kinds::default();
     let study = study(FILE, &kinds).unwrap();
     // 2 gains from 2 ends, 2 laws at 2 K_hg, 2 loops, each with 2 seeds.
-    assert_eq!(study.plan().unwrap().cases.len(), 20);
+    assert_eq!(study.jobs().len(), 20);
     let on = |threads| on_threads(Some(threads), || study.run(&Watch::nobody()).unwrap()).unwrap();
     let (one, three) = (on(1), on(3));
     assert_eq!(one, three);

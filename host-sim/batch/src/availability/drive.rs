@@ -78,7 +78,7 @@ pub(super) fn side_by_side(
     judged.collect()
 }
 
-/// The same driver without guidance: what this driver would make of its torque does not matter where there is none.
+/// The driver without guidance: what this driver would make of its torque does not matter where there is none.
 fn manual(scenario: &Scenario) -> Result<Scenario, StudyError> {
     let gains = ArmGains {
         k_hg: 0.0,

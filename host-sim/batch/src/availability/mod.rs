@@ -126,7 +126,7 @@ pub struct Cell {
     pub available: f64,
     /// False declarations.
     pub declarations: Rate,
-    /// The same by the faults that the ECU named, the most frequent first.
+    /// False declarations by the faults that the ECU named, the most frequent first.
     pub causes: Vec<Cause>,
     /// Cars that drove.
     pub cars: usize,

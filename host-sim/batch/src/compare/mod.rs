@@ -22,7 +22,7 @@ use haptic_sim::drivers::AnyDriver;
 use haptic_sim::input::InputError;
 use haptic_sim::laws::Law;
 
-use crate::engine::{Part, Plan, Study, Watch};
+use crate::engine::{Watch, each};
 use crate::error::StudyError;
 use crate::files::Source;
 use crate::places::{Drives, seed_of};
@@ -96,25 +96,12 @@ impl<'k> Compare<'k> {
     /// As [`haptic_sim::scenario::ScenarioBuilder::build`] for a driver's parameters.
     pub fn run(&self, watch: &Watch<'_>) -> Result<CompareResults, StudyError> {
         let tuned = tune::tune(self, watch)?;
+        let sets: Vec<Vec<Vec<f64>>> = tuned.iter().map(|law| law.values.clone()).collect();
+        let mut jobs = self.jobs(&self.judged, |_| 1);
         // A driver's own set has the driver's number.
-        let of_driver = |job: Job| Job {
-            set: job.driver,
-            ..job
-        };
-        let judged = Stage {
-            compare: self,
-            jobs: self
-                .jobs(&self.judged, |_| 1)
-                .into_iter()
-                .map(of_driver)
-                .collect(),
-            sets: &tuned.iter().map(|law| law.values.clone()).collect::<Vec<_>>(),
-            drives: &self.judged,
-            stream: "judged",
-            faults: self.faults,
-        };
-        let driven = judged.run(watch)?;
-        Ok(results::sum_up(self, tuned, &judged.jobs, &driven))
+        jobs.iter_mut().for_each(|job| job.set = job.driver);
+        let driven = self.drive(&jobs, &sets, &self.judged, "judged", self.faults, watch)?;
+        Ok(results::sum_up(self, tuned, &jobs, &driven))
     }
 
     fn jobs(&self, drives: &Drives, sets: impl Fn(usize) -> usize) -> Vec<Job> {
@@ -136,41 +123,24 @@ impl<'k> Compare<'k> {
         }
         jobs
     }
-}
 
-/// The drives of a tuning, or those that are judged.
-struct Stage<'a> {
-    compare: &'a Compare<'a>,
-    jobs: Vec<Job>,
-    /// Sets of parameters for each law.
-    sets: &'a [Vec<Vec<f64>>],
-    drives: &'a Drives,
-    stream: &'static str,
-    faults: Faults,
-}
-
-impl Study for Stage<'_> {
-    type Case = Job;
-    type Row = Driven;
-    type Results = Vec<Driven>;
-
-    fn plan(&self) -> Result<Plan<Job>, StudyError> {
-        Ok(Plan::one_by_one(self.jobs.clone()))
-    }
-
-    fn drive(&self, part: &Part<'_, Job, Driven>) -> Result<Vec<Driven>, StudyError> {
-        part.one_by_one(|job| {
-            let compare = self.compare;
-            let (road, speed_kmh, scenario) = &self.drives.places[job.place];
-            let seed = seed_of(compare.seed, self.stream, road, *speed_kmh, job.seed);
+    /// Drives with sets of parameters for each law, in the order of the jobs.
+    fn drive(
+        &self,
+        jobs: &[Job],
+        sets: &[Vec<Vec<f64>>],
+        drives: &Drives,
+        stream: &str,
+        faults: Faults,
+        watch: &Watch<'_>,
+    ) -> Result<Vec<Driven>, StudyError> {
+        each(jobs, watch, |job| {
+            let (road, speed_kmh, scenario) = &drives.places[job.place];
+            let seed = seed_of(self.seed, stream, road, *speed_kmh, job.seed);
             let scenario = scenario.to_builder().seed(seed).build()?;
-            let law = compare.laws[job.law].make(&scenario, &self.sets[job.law][job.set])?;
-            let driver = compare.drivers[job.driver].untuned_part(&scenario)?;
-            Ok(Driven::new(&scenario, law, driver, self.faults))
+            let law = self.laws[job.law].make(&scenario, &sets[job.law][job.set])?;
+            let driver = self.drivers[job.driver].untuned_part(&scenario)?;
+            Ok(Driven::new(&scenario, law, driver, faults))
         })
-    }
-
-    fn summarise(&self, _: Vec<Job>, driven: Vec<Driven>) -> Result<Vec<Driven>, StudyError> {
-        Ok(driven)
     }
 }

@@ -55,7 +55,7 @@ pub struct Ratio {
     pub world: usize,
     /// Place of the metric.
     pub metric: usize,
-    /// Of the means over drivers and places, with its interval over the seeds.
+    /// The ratio of the means over drivers and places, with its interval over the seeds.
     pub mean: Mean,
     /// The largest of a driver, and the place of that driver.
     pub largest: (f64, usize),
@@ -81,7 +81,7 @@ pub struct CompareResults {
     pub name: String,
     /// What it was judged by.
     pub metrics: Vec<Metric>,
-    /// As listed.
+    /// The laws, as listed.
     pub laws: Vec<LawResult>,
     /// Names and kinds, as listed.
     pub drivers: Vec<[String; 2]>,
@@ -311,7 +311,7 @@ fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &boo
     }
 }
 
-/// Of values by place, then seed: each seed's mean over the places that have a value, then over the seeds.
+/// The mean of values by place, then seed: each seed's mean over the places that have a value, then over the seeds.
 fn mean(seeds: u32, level: Confidence, values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
     let mut sums = vec![(0.0, 0_u32); seeds as usize];
     for (number, value) in values.enumerate() {

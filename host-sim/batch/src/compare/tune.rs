@@ -1,7 +1,7 @@
-//! The same budget for every law: its untuned set, and points of Sobol's sequence in the box of what tuning may vary. The set with the
+//! Every law has one budget: its untuned set, and points of Sobol's sequence in the box of what tuning may vary. The set with the
 //! least objective is judged; the objective is a weighted sum of metrics, averaged over the training drives.
 
-use super::{Compare, Driven, Faults, METRICS, Stage, Study, StudyError, Watch};
+use super::{Compare, Driven, Faults, METRICS, StudyError, Watch};
 use crate::sobol::Dimension;
 
 /// A law after tuning.
@@ -52,15 +52,8 @@ pub(super) fn tune(compare: &Compare, watch: &Watch<'_>) -> Result<Vec<Tuned>, S
     let Some(tuning) = &compare.tuning else {
         return Ok((0..all.len()).map(untuned).collect());
     };
-    let stage = Stage {
-        compare,
-        jobs: compare.jobs(&tuning.drives, |law| all[law].len()),
-        sets: &all,
-        drives: &tuning.drives,
-        stream: "tuning",
-        faults: Faults::default(),
-    };
-    let driven = stage.run(watch)?;
+    let jobs = compare.jobs(&tuning.drives, |law| all[law].len());
+    let driven = compare.drive(&jobs, &all, &tuning.drives, "tuning", Faults::default(), watch)?;
     let drivers = compare.drivers.len();
     let of_driver = tuning.drives.places.len() * tuning.drives.seeds as usize;
     let mean = |group: &[Driven]| {

@@ -137,7 +137,7 @@ pub struct Plan<C> {
 /// Which cases a thread drives at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Driven {
-    /// Runs go side by side, so many as can; the seed draws those that the shipping ECU drives a second time.
+    /// Several side by side; the seed draws those that the shipping ECU drives a second time.
     SideBySide {
         /// Root of the draw.
         seed: u64,

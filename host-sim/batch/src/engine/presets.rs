@@ -1,7 +1,5 @@
 //! Studies that are a list of jobs and no more: whoever has the list gets a row for each.
 
-use std::marker::PhantomData;
-
 use haptic_analysis::identify::DriveLog;
 use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::Run;
@@ -9,19 +7,16 @@ use haptic_sim::simulation::Run;
 use super::{Driven, Part, Plan, Study, Watch};
 use crate::error::StudyError;
 
-struct Jobs<'a, J, R, F> {
+/// How the rows of a part are made.
+type Drive<'a, J, R> = &'a (dyn Fn(&Part<'_, &'a J, R>) -> Result<Vec<R>, StudyError> + Sync);
+
+struct Jobs<'a, J, R> {
     jobs: &'a [J],
     driven: Driven,
-    drive: F,
-    row: PhantomData<fn() -> R>,
+    drive: Drive<'a, J, R>,
 }
 
-impl<'a, J, R, F> Study for Jobs<'a, J, R, F>
-where
-    J: Sync,
-    R: Send,
-    F: Fn(&Part<'_, &'a J, R>) -> Result<Vec<R>, StudyError> + Sync,
-{
+impl<'a, J: Sync, R: Send> Study for Jobs<'a, J, R> {
     type Case = &'a J;
     type Row = R;
     type Results = Vec<R>;
@@ -42,22 +37,6 @@ where
     }
 }
 
-fn rows<'a, J: Sync, R: Send>(
-    jobs: &'a [J],
-    driven: Driven,
-    watch: &Watch<'_>,
-    drive: impl Fn(&Part<'_, &'a J, R>) -> Result<Vec<R>, StudyError> + Sync,
-) -> Result<Vec<R>, StudyError> {
-    let row = PhantomData;
-    let jobs = Jobs {
-        jobs,
-        driven,
-        drive,
-        row,
-    };
-    jobs.run(watch)
-}
-
 /// Makes a row of each job, on every core.
 ///
 /// # Errors
@@ -67,9 +46,9 @@ pub fn each<J: Sync, R: Send>(
     watch: &Watch<'_>,
     drive: impl Fn(&J) -> Result<R, StudyError> + Sync,
 ) -> Result<Vec<R>, StudyError> {
-    rows(jobs, Driven::OneByOne, watch, |part| {
-        part.one_by_one(|job| drive(job))
-    })
+    let drive: Drive<'_, J, R> = &|part| part.one_by_one(|job| drive(job));
+    let driven = Driven::OneByOne;
+    Jobs { jobs, driven, drive }.run(watch)
 }
 
 /// Drives a scenario for each job side by side where that can be, and makes a row of its run.
@@ -83,12 +62,10 @@ pub fn runs<J: Sync, R: Send>(
     scenario: impl Fn(&J) -> Result<Scenario, StudyError> + Sync,
     measure: impl Fn(&J, &Scenario, &Run) -> Result<R, StudyError> + Sync,
 ) -> Result<Vec<R>, StudyError> {
-    rows(jobs, Driven::SideBySide { seed }, watch, |part| {
-        part.side_by_side(
-            |job| scenario(job),
-            |job, scenario, run| measure(job, scenario, run),
-        )
-    })
+    let drive: Drive<'_, J, R> =
+        &|part| part.side_by_side(|job| scenario(job), |job, own, run| measure(job, own, run));
+    let driven = Driven::SideBySide { seed };
+    Jobs { jobs, driven, drive }.run(watch)
 }
 
 /// Drives as [`runs`] does, with the log that the paper's apparatus would write.
@@ -102,10 +79,12 @@ pub fn logs<J: Sync, R: Send>(
     scenario: impl Fn(&J) -> Result<Scenario, StudyError> + Sync,
     measure: impl Fn(&J, &Scenario, &Run, DriveLog) -> Result<R, StudyError> + Sync,
 ) -> Result<Vec<R>, StudyError> {
-    rows(jobs, Driven::SideBySide { seed }, watch, |part| {
+    let drive: Drive<'_, J, R> = &|part| {
         part.logged(
             |job| scenario(job),
-            |job, scenario, run, log| measure(job, scenario, run, log),
+            |job, own, run, log| measure(job, own, run, log),
         )
-    })
+    };
+    let driven = Driven::SideBySide { seed };
+    Jobs { jobs, driven, drive }.run(watch)
 }

@@ -14,8 +14,7 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// Tables with their columns, at the places of the CSV and of the Parquet file. The Parquet file holds the metadata
-    /// too.
+    /// Begins both with their columns, at the places of the CSV and of the Parquet file. The Parquet file holds the metadata too.
     ///
     /// # Errors
     /// What the disk says.

@@ -9,7 +9,7 @@ pub use crate::paper::DRIVERS_T_P;
 pub use results::EvaluationResults;
 
 use crate::RunRecord;
-use crate::engine::{Part, Plan, Study, Watch};
+use crate::engine::{Watch, runs};
 use crate::error::StudyError;
 use crate::record::{check_window, default_window, failure_notes, nominal_peak_m};
 use haptic_analysis::metrics::Window;
@@ -27,14 +27,8 @@ pub struct Evaluation {
     pub results: EvaluationResults,
 }
 
-/// The evaluation of a base, which gives course, speed, sensors, vehicle, guidance and the time of the failure; its driver's delay,
-/// condition and kind of failure are varied.
-struct Evaluate<'a> {
-    base: &'a Scenario,
-    window: Window,
-}
-
-/// Runs the evaluation of a base on all cores, over a window of the road: 3 drivers x (4 conditions + 2 x 3 that can fail).
+/// Runs the evaluation on all cores: 3 drivers x (4 conditions + 2 x 3 that can fail). `base` gives course, speed, sensors, vehicle,
+/// guidance and the time of the failure; its driver's delay, condition and kind of failure are varied.
 ///
 /// # Errors
 /// A manual base that has what takes guidance; a window that does not lie where the runs drive.
@@ -45,57 +39,41 @@ pub fn evaluate(
 ) -> Result<Evaluation, StudyError> {
     let window = window.unwrap_or_else(|| default_window(base.course()));
     check_window(window, base)?;
-    Evaluate { base, window }.run(watch)
-}
-
-impl Study for Evaluate<'_> {
-    type Case = Scenario;
-    type Row = Run;
-    type Results = Evaluation;
-
-    fn plan(&self) -> Result<Plan<Scenario>, StudyError> {
-        Ok(Plan::side_by_side(scenarios(self.base)?, self.base.seed()))
+    let scenarios = scenarios(base)?;
+    let own = |scenario: &Scenario| Ok(scenario.clone());
+    let runs = runs(&scenarios, base.seed(), watch, own, |_, _, run| Ok(run.clone()))?;
+    let runs: Vec<(Scenario, Run)> = scenarios.into_iter().zip(runs).collect();
+    let peak_without_failure = |failed: &Scenario| {
+        let failure_time_s = failed.failure().at_s()?;
+        let (_, run) = runs.iter().find(|(scenario, _)| {
+            let same = scenario.driver() == failed.driver() && scenario.condition() == failed.condition();
+            same && scenario.failure().kind == FailureKind::None
+        })?;
+        nominal_peak_m(run, window, failure_time_s)
+    };
+    let records: Vec<_> = runs
+        .iter()
+        .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
+        .collect();
+    let notes = failure_notes(base.failure().time_s, &records, window);
+    let mut results = EvaluationResults {
+        course: base.course().name().into(),
+        course_length_m: base.course().length_m(),
+        speed_kmh: base.speed_kmh(),
+        failure_time_s: base.failure().time_s,
+        sensors: base.sensors(),
+        window_m: [window.from_m, window.to_m],
+        runs: records,
+        claims: Vec::new(),
+        notes,
+    };
+    if claims::apply_to(base, window) {
+        results.claims = claims::check(&results, &runs);
+    } else {
+        results.notes.push(claims::NONE_APPLIES.into());
     }
-
-    fn drive(&self, part: &Part<'_, Scenario, Run>) -> Result<Vec<Run>, StudyError> {
-        part.side_by_side(|scenario| Ok(scenario.clone()), |_, _, run| Ok(run.clone()))
-    }
-
-    fn summarise(&self, scenarios: Vec<Scenario>, runs: Vec<Run>) -> Result<Evaluation, StudyError> {
-        let Self { base, window } = *self;
-        let runs: Vec<(Scenario, Run)> = scenarios.into_iter().zip(runs).collect();
-        let peak_without_failure = |failed: &Scenario| {
-            let failure_time_s = failed.failure().at_s()?;
-            let (_, run) = runs.iter().find(|(scenario, _)| {
-                let same = scenario.driver() == failed.driver() && scenario.condition() == failed.condition();
-                same && scenario.failure().kind == FailureKind::None
-            })?;
-            nominal_peak_m(run, window, failure_time_s)
-        };
-        let records: Vec<_> = runs
-            .iter()
-            .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
-            .collect();
-        let notes = failure_notes(base.failure().time_s, &records, window);
-        let mut results = EvaluationResults {
-            course: base.course().name().into(),
-            course_length_m: base.course().length_m(),
-            speed_kmh: base.speed_kmh(),
-            failure_time_s: base.failure().time_s,
-            sensors: base.sensors(),
-            window_m: [window.from_m, window.to_m],
-            runs: records,
-            claims: Vec::new(),
-            notes,
-        };
-        if claims::apply_to(base, window) {
-            results.claims = claims::check(&results, &runs);
-        } else {
-            results.notes.push(claims::NONE_APPLIES.into());
-        }
-        results.claims.extend(claims::guided_throughout(&results));
-        Ok(Evaluation { runs, results })
-    }
+    results.claims.extend(claims::guided_throughout(&results));
+    Ok(Evaluation { runs, results })
 }
 
 /// Driver by driver without failure, then with the sudden loss; behind all of them the lost inputs.

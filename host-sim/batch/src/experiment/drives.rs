@@ -15,7 +15,7 @@ use crate::recorder::recorded;
 pub struct Driven {
     /// What was driven.
     pub scenario: Scenario,
-    /// As it was recorded.
+    /// How it was recorded.
     pub log: DriveLog,
     pub(super) path: Vec<(f64, f64)>,
     /// When the guidance was away.
@@ -43,7 +43,7 @@ pub fn driven(plan: &ExperimentPlan, number: u32, truth: &PublishedDriver) -> Re
     driven_by(plan, number, truth, truth.parameters())
 }
 
-/// [`driven`] by a driver who differs from the published one in what the log does not name.
+/// Lets a driver drive who differs from the published one in what the log does not name.
 ///
 /// # Errors
 /// A probe that the controller refuses.

@@ -16,7 +16,6 @@ mod drives;
 
 use serde::Serialize;
 
-pub use crate::drivers::{COMPARED, Compared, compared};
 pub use crate::paper::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
 pub use crate::recorder::Recorder;
 pub use drives::{Driven, driven, driven_by, guided, scenario_of_drive};
@@ -31,7 +30,7 @@ use haptic_sim::scenario::Scenario;
 
 use crate::Away;
 use crate::drivers::identified_driver;
-pub use crate::drivers::{Probe, truth_of};
+pub use crate::drivers::{COMPARED, Compared, Probe, compared, truth_of};
 use crate::engine::{Watch, logs, runs};
 use crate::error::StudyError;
 

@@ -2,7 +2,7 @@
 
 use haptic_sim::scenario::{Condition, FailureKind};
 
-use super::{Bend, Drive, Driver, Figure, HandoverRow, Peaks, Place, Way};
+use super::{Bend, Drive, Driver, Figure, HandoverRow, Peaks, Place};
 
 /// What is left of the lane beside a vehicle of 1.7 m in its middle, m.
 const IN_LANE_M: f64 = 0.95;
@@ -61,29 +61,20 @@ pub(super) fn instants(drives: &[Drive], peaks: &[Peaks]) -> Vec<Instant> {
     found
 }
 
-/// From the drives in the order of [`Handover::ways`].
+/// From the drives in the order of [`super::drives_of`].
 fn instants_of_driver(drives: &[Drive], peaks: &[Peaks], found: &mut Vec<Instant>) {
     let [by_hand, mut nominal, mut handed] = [peaks[0]; 3];
-    for (drive, own) in drives.iter().zip(peaks) {
-        match drive.way {
-            Way::ByHand => {}
-            Way::Guided(_) => nominal = *own,
-            Way::Failed {
-                kind: FailureKind::Input,
-                ..
-            } => handed = *own,
-            Way::Failed {
-                condition,
-                at_s,
-                takes_over_after_s,
-                ..
-            } => {
+    for (drive, own) in drives.iter().zip(peaks).skip(1) {
+        match drive.failure.kind {
+            FailureKind::None => nominal = *own,
+            FailureKind::Input => handed = *own,
+            FailureKind::Torque => {
                 let of_instant = [nominal, handed, *own];
                 found.push(Instant {
                     driver: drive.driver,
-                    condition,
-                    takes_over_after_s,
-                    at_s,
+                    condition: drive.condition,
+                    takes_over_after_s: drive.takes_over_after_s,
+                    at_s: drive.failure.time_s,
                     peaks_m: [handed.peak_m, own.peak_m, nominal.peak_m.max(by_hand.peak_m)],
                     left_by_itself: of_instant.iter().filter(|drive| drive.left_by_itself).count(),
                 });

@@ -11,7 +11,7 @@
 //! left out: this driver drives nearly as by hand.
 //!
 //! - [`Bend`]: the roads and their speeds.
-//! - [`Handover`]: the drives, and the worst and the median of what they cost.
+//! - [`study`]: the drives, and the worst and the median of what they cost.
 //! - [`HandoverResults`]: what the study found, and what a row has to keep.
 
 mod bend;
@@ -21,11 +21,11 @@ mod results;
 mod tests;
 
 pub use bend::{Bend, Side};
-use instants::{instants, row};
+use instants::{Instant, instants, row};
 pub use results::{Figure, HandoverResults, HandoverRow, MOST_BESIDE_DROP, Place};
 
 use crate::Away;
-use crate::engine::{Part, Plan, Study};
+use crate::engine::{Watch, runs};
 use crate::error::StudyError;
 use crate::paper::DRIVERS_T_P;
 use crate::record::peak_m;
@@ -57,166 +57,105 @@ struct Driver {
     t_p: f64,
 }
 
-/// How a driver goes through a bend.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Way {
-    ByHand,
-    /// With guidance that does not fail.
-    Guided(Condition),
-    Failed {
-        condition: Condition,
-        kind: FailureKind,
-        at_s: f64,
-        takes_over_after_s: f64,
-    },
-}
-
 /// A drive of the study.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drive {
-    driver: Driver,
-    way: Way,
-    /// Place of the road, of those for who drives by hand and for the others.
-    road: [usize; 2],
-}
-
-/// The study: every bend to both sides with every driver, a failure at instants so far apart.
 #[derive(Debug, Clone)]
-pub struct Handover {
-    every_s: f64,
-    bends: Vec<Bend>,
-    /// By bend and side: for who drives by hand, and for the others.
-    roads: Vec<[Course; 2]>,
+struct Drive {
+    driver: Driver,
+    /// By hand, or how much the driver relies on the guidance.
+    condition: Condition,
+    failure: Failure,
+    takes_over_after_s: f64,
+    road: Course,
 }
 
-impl Handover {
-    /// With instants so far apart.
-    ///
-    /// # Errors
-    /// None of these roads meets one.
-    pub fn new(every_s: f64) -> Result<Self, StudyError> {
-        Self::of_bends(Bend::all(), every_s)
-    }
+/// Drives every bend on all cores.
+///
+/// # Errors
+/// As [`haptic_sim::scenario::ScenarioBuilder::build`], none of these scenarios meets one; a run that differs from the shipping
+/// ECU's.
+pub fn study(every_s: f64, watch: &Watch<'_>) -> Result<HandoverResults, StudyError> {
+    let bends = Bend::all();
+    let instants = instants_of(&bends, every_s, watch)?;
+    let rows = std::iter::once(None).chain(bends.iter().copied().map(Some));
+    let rows = rows.flat_map(|bend| RELIANCES.map(|condition| (bend, condition)));
+    let rows = rows.flat_map(|(bend, condition)| TAKES_OVER_S.map(|after_s| (bend, condition, after_s)));
+    Ok(HandoverResults {
+        every_s,
+        rows: rows
+            .map(|(bend, condition, after_s)| row(&instants, bend, condition, after_s))
+            .collect(),
+        most_beside_drop: MOST_BESIDE_DROP,
+    })
+}
 
-    fn of_bends(bends: Vec<Bend>, every_s: f64) -> Result<Self, StudyError> {
-        let sides = bends
-            .iter()
-            .flat_map(|bend| [Side::Left, Side::Right].map(|side| (bend, side)));
-        let roads = sides.map(|(bend, side)| -> Result<[Course; 2], StudyError> {
-            let [by_hand, guided] = BEHIND_S.map(|behind_s| bend.course(side, behind_s));
-            Ok([by_hand?, guided?])
-        });
-        let roads = roads.collect::<Result<_, _>>()?;
-        Ok(Self {
-            every_s,
-            bends,
-            roads,
-        })
-    }
+/// What came of every instant of some bends, for the drivers who are judged there.
+fn instants_of(bends: &[Bend], every_s: f64, watch: &Watch<'_>) -> Result<Vec<Instant>, StudyError> {
+    let drives = bends.iter().map(|bend| drives_of(*bend, every_s));
+    let drives = drives.collect::<Result<Vec<_>, _>>()?.concat();
+    let seed = Scenario::default().seed();
+    let peaks = runs(&drives, seed, watch, scenario, |drive, scenario, run| {
+        Ok(Peaks::new(drive.driver.bend, scenario, run))
+    })?;
+    Ok(instants(&drives, &peaks))
+}
 
-    /// A driver's ways through a bend: by hand; then each reliance without a failure, and with each failure.
-    fn ways(&self, bend: Bend) -> Vec<Way> {
-        let mut ways = vec![Way::ByHand];
-        for condition in RELIANCES {
-            ways.push(Way::Guided(condition));
-            for at_s in bend.instants_s(self.every_s) {
-                for takes_over_after_s in TAKES_OVER_S {
-                    ways.extend(KINDS.map(|kind| Way::Failed {
-                        condition,
-                        kind,
-                        at_s,
-                        takes_over_after_s,
-                    }));
-                }
-            }
-        }
-        ways
-    }
-
-    fn scenario(&self, drive: &Drive) -> Result<Scenario, StudyError> {
-        let mut driver = DriverParameters {
-            t_p: drive.driver.t_p,
-            ..Default::default()
-        };
-        let (condition, kind, time_s) = match drive.way {
-            Way::ByHand => (Condition::Manual, FailureKind::None, 0.0),
-            Way::Guided(condition) => (condition, FailureKind::None, 0.0),
-            Way::Failed {
+/// A bend's drives, driver by driver: by hand; then each reliance without a failure, and with each failure.
+fn drives_of(bend: Bend, every_s: f64) -> Result<Vec<Drive>, StudyError> {
+    let default_s = DriverParameters::default().takes_over_after_s;
+    let mut drives = Vec::new();
+    for side in [Side::Left, Side::Right] {
+        let [by_hand, guided] = BEHIND_S.map(|behind_s| bend.course(side, behind_s));
+        let (by_hand, guided) = (by_hand?, guided?);
+        for t_p in DRIVERS_T_P {
+            let drive = |road: &Course, condition, kind, time_s, takes_over_after_s| Drive {
+                driver: Driver { bend, side, t_p },
                 condition,
-                kind,
-                at_s,
+                failure: Failure {
+                    kind,
+                    time_s,
+                    duration_s: None,
+                },
                 takes_over_after_s,
-            } => {
-                driver.takes_over_after_s = takes_over_after_s;
-                (condition, kind, at_s)
-            }
-        };
-        let [road, kind_of_road] = drive.road;
-        let scenario = Scenario::builder()
-            .course(self.roads[road][kind_of_road].clone())
-            .speed_kmh(drive.driver.bend.speed_kmh)
-            .condition(condition)
-            .driver(driver)
-            .failure(Failure {
-                kind,
-                time_s,
-                duration_s: None,
-            });
-        Ok(scenario.build()?)
-    }
-}
-
-impl Study for Handover {
-    type Case = Drive;
-    type Row = Peaks;
-    type Results = HandoverResults;
-
-    fn plan(&self) -> Result<Plan<Drive>, StudyError> {
-        let mut cases = Vec::new();
-        for (place, bend) in self.bends.iter().enumerate() {
-            let ways = self.ways(*bend);
-            for (of_side, side) in [Side::Left, Side::Right].into_iter().enumerate() {
-                for t_p in DRIVERS_T_P {
-                    cases.extend(ways.iter().map(|way| Drive {
-                        driver: Driver {
-                            bend: *bend,
-                            side,
-                            t_p,
-                        },
-                        way: *way,
-                        road: [2 * place + of_side, usize::from(*way != Way::ByHand)],
-                    }));
+                road: road.clone(),
+            };
+            drives.push(drive(
+                &by_hand,
+                Condition::Manual,
+                FailureKind::None,
+                0.0,
+                default_s,
+            ));
+            for condition in RELIANCES {
+                drives.push(drive(&guided, condition, FailureKind::None, 0.0, default_s));
+                for at_s in bend.instants_s(every_s) {
+                    for after_s in TAKES_OVER_S {
+                        drives.extend(KINDS.map(|kind| drive(&guided, condition, kind, at_s, after_s)));
+                    }
                 }
             }
         }
-        Ok(Plan::side_by_side(cases, Scenario::default().seed()))
     }
+    Ok(drives)
+}
 
-    fn drive(&self, part: &Part<'_, Drive, Peaks>) -> Result<Vec<Peaks>, StudyError> {
-        part.side_by_side(
-            |drive| self.scenario(drive),
-            |drive, scenario, run| Ok(Peaks::new(drive.driver.bend, scenario, run)),
-        )
-    }
-
-    fn summarise(&self, cases: Vec<Drive>, peaks: Vec<Peaks>) -> Result<HandoverResults, StudyError> {
-        let instants = instants(&cases, &peaks);
-        let rows = std::iter::once(None).chain(self.bends.iter().copied().map(Some));
-        let rows = rows.flat_map(|bend| RELIANCES.map(|condition| (bend, condition)));
-        let rows = rows.flat_map(|(bend, condition)| TAKES_OVER_S.map(|after_s| (bend, condition, after_s)));
-        Ok(HandoverResults {
-            every_s: self.every_s,
-            rows: rows
-                .map(|(bend, condition, after_s)| row(&instants, bend, condition, after_s))
-                .collect(),
-            most_beside_drop: MOST_BESIDE_DROP,
-        })
-    }
+fn scenario(drive: &Drive) -> Result<Scenario, StudyError> {
+    let driver = DriverParameters {
+        t_p: drive.driver.t_p,
+        takes_over_after_s: drive.takes_over_after_s,
+        ..Default::default()
+    };
+    let scenario = Scenario::builder()
+        .course(drive.road.clone())
+        .speed_kmh(drive.driver.bend.speed_kmh)
+        .condition(drive.condition)
+        .driver(driver)
+        .failure(drive.failure);
+    Ok(scenario.build()?)
 }
 
 /// Peaks of a drive, m, and whether the ECU left by itself.
 #[derive(Debug, Clone, Copy)]
-pub struct Peaks {
+struct Peaks {
     /// From the failure on; without one of the whole drive.
     peak_m: f64,
     /// Whether it dies down on the straight behind the bend.

@@ -1,36 +1,10 @@
-use super::instants::Instant;
 use super::*;
 use crate::engine::Watch;
-
-/// A study whose results are its instants.
-struct Instants(Handover);
-
-impl Study for Instants {
-    type Case = Drive;
-    type Row = Peaks;
-    type Results = Vec<Instant>;
-
-    fn plan(&self) -> Result<Plan<Drive>, StudyError> {
-        self.0.plan()
-    }
-
-    fn drive(&self, part: &Part<'_, Drive, Peaks>) -> Result<Vec<Peaks>, StudyError> {
-        self.0.drive(part)
-    }
-
-    fn summarise(&self, cases: Vec<Drive>, peaks: Vec<Peaks>) -> Result<Vec<Instant>, StudyError> {
-        Ok(instants(&cases, &peaks))
-    }
-}
-
-fn papers(every_s: f64) -> Handover {
-    Handover::of_bends(vec![Bend::PAPERS], every_s).unwrap()
-}
 
 /// Four instants of the paper's curve: the peaks of both sides, driver by driver.
 #[test]
 fn a_mirrored_bend_costs_the_same() {
-    let found = Instants(papers(8.0)).run(&Watch::nobody()).unwrap();
+    let found = instants_of(&[Bend::PAPERS], 8.0, &Watch::nobody()).unwrap();
     let of = |side| found.iter().filter(move |instant| instant.driver.side == side);
     // Before the bend, and 8, 16 and 24 s later, for three drivers of two reliances who take over after four times.
     assert_eq!(of(Side::Left).count(), 4 * 3 * 2 * 4);
@@ -104,7 +78,7 @@ fn drives() -> Vec<Peaks> {
 const APART_S: f64 = 31.6;
 
 fn found(peaks: &[Peaks]) -> Vec<Instant> {
-    let cases = papers(APART_S).plan().unwrap().cases.into_iter();
+    let cases = drives_of(Bend::PAPERS, APART_S).unwrap().into_iter();
     let own = cases.filter(|case| case.driver.side == Side::Right && case.driver.t_p == 0.3);
     instants(&own.collect::<Vec<_>>(), peaks)
 }

@@ -60,7 +60,7 @@ pub enum Subject {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
-    /// This program simulated it.
+    /// This program.
     Simulated,
     /// A file that was brought in.
     Imported,
@@ -173,7 +173,7 @@ impl Study {
         self.import_table(out, what, (file, &csv?))
     }
 
-    /// The table of another file, as CSV.
+    /// Keeps a person's recording that was read from another file, as CSV.
     ///
     /// # Errors
     /// As [`Study::import`].

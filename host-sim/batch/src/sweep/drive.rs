@@ -6,7 +6,7 @@ use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::{Run, simulate};
 
-use super::{Chunk, DesignPoint, Sweep};
+use super::{DesignPoint, Sweep};
 use crate::record::{default_window, nominal_peak_m};
 use crate::{Away, RunRecord};
 
@@ -48,18 +48,6 @@ impl Sweep {
     pub(super) fn recovers_from(&self, scenario: &Scenario) -> Option<f64> {
         let recovery = self.metrics.iter().any(|d| d.name == "time_to_recover_s");
         scenario.failure().at_s().filter(|_| recovery)
-    }
-
-    /// Drives a chunk one by one with the shipping ECU: what [`Sweep::run_chunk`] gives too, and slower.
-    ///
-    /// # Errors
-    /// As [`Sweep::scenario`].
-    pub fn run_chunk_one_by_one(&self, number: u64) -> Result<Chunk, InputError> {
-        let rows = self.drives_of(number).map(|drive| self.drive(&self.point(drive)));
-        Ok(Chunk {
-            number,
-            rows: rows.collect::<Result<_, _>>()?,
-        })
     }
 
     pub(super) fn window_of(&self, scenario: &Scenario) -> Window {

@@ -76,15 +76,21 @@ impl Sweep {
 
 #[cfg(test)]
 mod tests {
-    use crate::sweep::Sweep;
     use crate::sweep::tests::with_road;
+    use crate::sweep::{Chunk, Sweep};
 
     /// Holds each chunk's bytes side by side to those one by one; how many drives can be vectorised, and how many not.
     fn same_bytes(sweep: &Sweep) -> (usize, usize) {
         let (mut batched, mut out) = (0, 0);
         for chunk in 0..sweep.chunks() {
             let side_by_side = sweep.run_chunk(chunk).unwrap();
-            let alone = sweep.run_chunk_one_by_one(chunk).unwrap();
+            let alone = Chunk {
+                number: chunk,
+                rows: sweep
+                    .drives_of(chunk)
+                    .map(|drive| sweep.drive(&sweep.point(drive)).unwrap())
+                    .collect(),
+            };
             assert_eq!(side_by_side.to_bytes(1), alone.to_bytes(1), "chunk {chunk}");
             for drive in sweep.drives_of(chunk) {
                 let scenario = sweep.scenario(&sweep.point(drive)).unwrap();

@@ -2,8 +2,7 @@
 
 use crate::reports::handover::report;
 use clap::Args;
-use haptic_batch::engine::Study;
-use haptic_batch::handover::{EVERY_S, Handover, HandoverRow};
+use haptic_batch::handover::{EVERY_S, HandoverRow, study};
 
 use host_sim::cli::progress::Threads;
 use host_sim::cli::results::ResultArguments;
@@ -31,8 +30,9 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("handover")?;
-    let study = Handover::new(arguments.every)?;
-    let results = progress::watched("drives", |watch| arguments.threads.run(|| study.run(watch)))??;
+    let results = progress::watched("drives", |watch| {
+        arguments.threads.run(|| study(arguments.every, watch))
+    })??;
     let holds = !results.rows.iter().any(HandoverRow::is_broken);
     output.show(&report(&results), &results, holds)
 }

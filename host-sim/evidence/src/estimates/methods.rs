@@ -52,7 +52,7 @@ pub struct Methods {
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn methods(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>,) -> Result<Methods, StudyError> {
+pub fn methods(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Result<Methods, StudyError> {
     let jobs = guided(plan, seeds)?;
     let noises: Vec<(&'static str, &[Corruption])> = POPULATION
         .iter()

@@ -99,11 +99,7 @@ pub const CHANNELS: [(&str, Channel); 9] = [
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn recordings(
-    plan: &ExperimentPlan,
-    seeds: u32,
-    watch: &Watch<'_>,
-) -> Result<Corruptions, StudyError> {
+pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Result<Corruptions, StudyError> {
     let layout = Layout::named("openlka")?;
     let jobs = guided(plan, seeds)?;
     let found = each(&jobs, watch, |&(number, truth, seed)| {

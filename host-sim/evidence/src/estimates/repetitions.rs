@@ -59,11 +59,7 @@ pub struct Repeated {
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn repeat(
-    plan: &ExperimentPlan,
-    repetitions: u32,
-    watch: &Watch<'_>,
-) -> Result<Repetitions, StudyError> {
+pub fn repeat(plan: &ExperimentPlan, repetitions: u32, watch: &Watch<'_>) -> Result<Repetitions, StudyError> {
     let jobs = guided(plan, repetitions)?;
     let found: Vec<DriveResult> = logs(
         &jobs,
