@@ -9,6 +9,7 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`real_drives`]: recordings of real people, half against half.
+//! - [`vehicle`]: the vehicle of a recorded drive.
 //! - [`run`]: one scenario.
 //! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
@@ -66,6 +67,8 @@ pub mod sweep;
 mod vectorised;
 
 pub mod stability;
+
+pub mod vehicle;
 
 pub use away::{Away, left_by_themselves};
 pub use error::StudyError;

@@ -14,7 +14,7 @@ const GROUPS: [(&str, &str); 5] = [
     ),
     (
         "People",
-        "identify drivers real-drives design study validate convert",
+        "identify identify-vehicle drivers real-drives design study validate convert",
     ),
     ("The ECU in simulation", "faults availability handover reliance"),
     ("The ECU on a bus", "ecu"),
@@ -50,7 +50,7 @@ pub(super) fn grouped(program: clap::Command) -> clap::Command {
         let _ = writeln!(help, "\n{header}{title}:{header:#}");
         for command in names.split(' ').filter_map(|name| program.find_subcommand(name)) {
             let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-            let _ = writeln!(help, "  {literal}{:<15} {literal:#}{about}", command.get_name());
+            let _ = writeln!(help, "  {literal}{:<16} {literal:#}{about}", command.get_name());
         }
     }
     let _ = write!(help, "\n{header}Options:{header:#}\n{{options}}{{after-help}}");

@@ -1,8 +1,9 @@
-//! `host-sim validate`: the estimates of `identify` against drivers whose truth is known.
+//! `host-sim validate`: the estimates of `identify` and `identify-vehicle` against drivers and vehicles whose truth is known.
 
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
 use haptic_batch::experiment::{CHANNELS, POPULATION, changes, corruptions, methods, recordings, repeat};
+use haptic_batch::vehicle::coverage;
 use haptic_report::studies::validation::Validation;
 
 use super::participants::Drives;
@@ -34,6 +35,11 @@ pub(super) struct Arguments {
     /// a torsion bar that feels the wheel), read each as `identify --layout openlka` does, and count as --corruptions does
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
     recordings: Option<u32>,
+    /// Drive CommonRoad's three vehicles N times in a linear, a nonlinear and a disturbed world, identify each as
+    /// `identify-vehicle` does, and ask how often the 95 % intervals hold the truth. Takes no participant and no probe. Exit code 1
+    /// if in the first two worlds an interval surely holds it in fewer than 90 %
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["participant", "probe"])]
+    vehicles: Option<u32>,
     /// Of --corruptions and --changes: only those whose name holds this
     #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings"])]
     only: String,
@@ -60,12 +66,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         (arguments.methods, 1),
         (arguments.changes, 1),
         (arguments.recordings, CHANNELS.len() as u64),
+        (arguments.vehicles, 3),
     ];
     let asked = questions
         .into_iter()
         .find_map(|(seeds, fits)| Some((seeds?, fits)));
     let (seeds, fits) = asked.unwrap_or((1, 1));
-    let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
+    let participants = if arguments.vehicles.is_some() {
+        1
+    } else {
+        plan.participants.len() as u64
+    };
+    let drives = fits * participants * u64::from(seeds);
     let result = progress::over(drives, "drives", |done| -> Result<_, StudyError> {
         Ok(if arguments.coverage.is_some() {
             Validation::Coverage(repeat(&plan, seeds, done)?)
@@ -75,6 +87,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, done)?))
         } else if arguments.recordings.is_some() {
             Validation::Recordings(Box::new(recordings(&plan, seeds, done)?))
+        } else if let Some(seeds) = arguments.vehicles {
+            Validation::Vehicles(coverage(u64::from(seeds), plan.seed, done)?)
         } else {
             Validation::Methods(methods(&plan, seeds, done)?)
         })

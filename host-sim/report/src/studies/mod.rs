@@ -24,6 +24,7 @@ pub mod stability;
 pub mod study;
 pub mod sweep;
 pub mod validation;
+pub mod vehicle;
 
 use crate::document::WriteError;
 use crate::plot::{Mark, Marker, PlotError, Series};

@@ -9,8 +9,9 @@ use haptic_batch::experiment::{
     Changes, CorruptionLine, Corruptions, ExperimentPlan, Held, METHODS, MethodLine, Methods, Repeated,
     Repetitions,
 };
+use haptic_batch::vehicle::VehicleCoverage;
 
-/// One of the five questions that the validation asks, answered.
+/// One of the six questions that the validation asks, answered.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Validation {
@@ -25,6 +26,8 @@ pub enum Validation {
     /// What is identified from recordings like those of real people, and is anything of it wrong? Its corruptions are the
     /// ways of recording.
     Recordings(Box<Corruptions>),
+    /// Do the intervals of vehicles hold the truth as often as they say?
+    Vehicles(VehicleCoverage),
 }
 
 impl Validation {
@@ -35,6 +38,7 @@ impl Validation {
             Self::Corruptions(result) | Self::Recordings(result) => result.broken.clone(),
             Self::Changes(result) => result.broken.clone(),
             Self::Methods(_) => Vec::new(),
+            Self::Vehicles(result) => super::vehicle::off_coverage(result),
         }
     }
 
@@ -70,6 +74,7 @@ impl Validation {
             ),
             Self::Changes(r) => format!("{}. {}", of_plan(r.drives, &r.plan), changes::summary(r)),
             Self::Methods(r) => format!("{}.", of_plan(r.seeds, &r.plan)),
+            Self::Vehicles(r) => super::vehicle::coverage_summary(r),
             Self::Recordings(r) => format!(
                 "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
                  between it and the hands; each lane line has noise of 2 cm where nothing else is said.",
@@ -89,6 +94,7 @@ impl Validation {
             }
             Self::Changes(result) => vec![changes::table(result)],
             Self::Methods(result) => vec![methods_table(&result.lines)],
+            Self::Vehicles(result) => vec![super::vehicle::coverage_table(result)],
         }
     }
 
@@ -125,6 +131,11 @@ impl Validation {
                 "RMS errors by noise on the lane signals, as multiples of the information bound: the least of an unbiased estimator \
                  from exact ones. Beyond 6 bounds only the table shows them.",
             ),
+            Self::Vehicles(_) => (
+                "vehicles",
+                "Do the 95 % intervals of vehicles hold the truth?",
+                "Share of the identified values whose 95 % interval holds the truth.",
+            ),
         };
         let broken = self.broken().into_iter();
         let broken = broken.map(|line| Block::Text(format!("Not kept: {line}.")).on_page());
@@ -141,6 +152,7 @@ impl Validation {
             Self::Corruptions(result) | Self::Recordings(result) => corruptions_figure(result),
             Self::Changes(result) => changes::figure(result),
             Self::Methods(result) => methods_figure(&result.lines),
+            Self::Vehicles(result) => super::vehicle::coverage_figure(result),
         }
     }
 }
