@@ -35,9 +35,9 @@ pub(super) struct Arguments {
     /// a torsion bar that feels the wheel), read each as `identify --layout openlka` does, and count as --corruptions does
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
     recordings: Option<u32>,
-    /// Drive CommonRoad's three vehicles N times in a linear, a nonlinear and a disturbed world, identify each as
+    /// Share N drives between CommonRoad's three vehicles, in a linear, a nonlinear and a disturbed world each; identify them as
     /// `identify-vehicle` does, and ask how often the 95 % intervals hold the truth. Takes no participant and no probe. Exit code 1
-    /// if in the first two worlds an interval surely holds it in fewer than 90 %
+    /// if in the first two worlds those of a quantity surely hold it in fewer than 90 % (20 drives or more tell)
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["participant", "probe"])]
     vehicles: Option<u32>,
     /// Of --corruptions and --changes: only those whose name holds this

@@ -230,7 +230,7 @@ type Told = (&'static str, Option<(f64, bool)>);
 /// A drive of one of the vehicles to one of the sides. Every other six are told l_f and the yaw inertia too.
 fn drive(world_name: &str, seed: u64) -> Result<(Vec<Told>, bool), StudyError> {
     let (_, chassis, column) = CARS[(seed % 3) as usize];
-    let side = if seed / 3 % 2 == 0 { 1.0 } else { -1.0 };
+    let side = if (seed / 3).is_multiple_of(2) { 1.0 } else { -1.0 };
     let weighed = seed / 6 % 2 == 1;
     let vehicle = car(chassis, column);
     let friction_nm = if world_name == "linear" { 0.0 } else { column[4] };
@@ -272,6 +272,8 @@ fn drive(world_name: &str, seed: u64) -> Result<(Vec<Told>, bool), StudyError> {
 /// # Errors
 /// A drive that cannot be.
 pub fn coverage(drives: u64, seed: u64, done: impl Fn() + Sync) -> Result<VehicleCoverage, StudyError> {
+    // Vehicle, side and what is known follow from the seed: twelve drives are one of each.
+    let seed = seed - seed % 12;
     let mut coverage = VehicleCoverage {
         drives,
         seed,
@@ -280,7 +282,7 @@ pub fn coverage(drives: u64, seed: u64, done: impl Fn() + Sync) -> Result<Vehicl
     };
     for world in WORLDS {
         let all = (0..drives).into_par_iter().map(|k| {
-            let told = drive(world, seed - seed % 12 + k);
+            let told = drive(world, seed + k);
             done();
             told
         });

@@ -211,10 +211,12 @@ pub(super) fn coverage_figure(coverage: &VehicleCoverage) -> Figure {
 /// Intervals that surely hold the truth too rarely, outside the disturbed world.
 pub(super) fn off_coverage(coverage: &VehicleCoverage) -> Vec<String> {
     const LEAST: f64 = 0.9;
+    // Of fewer drives, one interval beside the truth would be too many.
+    const FEWEST: usize = 20;
     let judged = coverage.rows.iter().filter(|row| row.world != "disturbed");
     let broken = judged.filter_map(|row| {
         let (share, [_, high]) = row.coverage?;
-        (high < LEAST).then(|| {
+        (high < LEAST && row.identified >= FEWEST).then(|| {
             format!(
                 "{} in the {} world: {:.1} % of the 95 % intervals hold the truth",
                 row.name,
