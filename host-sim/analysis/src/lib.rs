@@ -4,6 +4,7 @@
 //! - [`identify`]: from a record to the parameters of the driver, with their uncertainty. K_hg is how strongly the
 //!   driver resists the guidance, t_p the delay from seeing to acting, `gain_i` what the torque can tell of vision. An
 //!   estimate that the data do not carry is no number but a verdict: not identified.
+//! - [`vehicle`]: from a record to the parameters of the vehicle and its steering column, with the same kind of verdicts.
 //!
 //! ```
 //! use haptic_analysis::identify::{DriveLog, Options, identify_with_noise_model};
@@ -23,3 +24,4 @@
 
 pub mod identify;
 pub mod metrics;
+pub mod vehicle;

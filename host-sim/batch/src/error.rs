@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use haptic_analysis::identify::{FixError, LogError};
+use haptic_analysis::vehicle::{ColumnsError, VehicleError};
 use haptic_sim::input::{InputError, RangeError};
 use haptic_sim::models::road::CourseError;
 use haptic_sim::scenario::ScenarioError;
@@ -29,6 +30,12 @@ pub enum StudyError {
     /// A parameter that is taken as known, and cannot be.
     #[error(transparent)]
     Fix(#[from] FixError),
+    /// A recording that has not what tells a vehicle.
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
+    /// A drive that cannot tell its vehicle.
+    #[error(transparent)]
+    Vehicle(#[from] VehicleError),
     /// A sweep's directory that cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),

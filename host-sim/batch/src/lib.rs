@@ -9,6 +9,7 @@
 //! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
+//! - [`vehicle`]: the vehicle of a recorded drive.
 //! - [`run`]: one scenario.
 //! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
@@ -68,6 +69,8 @@ pub mod study;
 pub mod sweep;
 
 pub mod stability;
+
+pub mod vehicle;
 
 pub use away::{Away, left_by_themselves};
 pub use engine::shares;

@@ -18,6 +18,7 @@ mod ecu;
 mod evaluate;
 mod experiment;
 mod identify;
+mod identify_vehicle;
 mod lab;
 mod names;
 pub mod output;
@@ -111,6 +112,10 @@ enum Command {
     ///
     /// With their uncertainty.
     Identify(identify::Arguments),
+    /// A vehicle's parameters from a recorded drive
+    ///
+    /// Ratio, understeer, tyres, and inertia, damping and friction of the column, with their uncertainty.
+    IdentifyVehicle(identify_vehicle::Arguments),
     /// Several drivers beside each other
     ///
     /// What differs between two, what a group is like.
@@ -119,7 +124,7 @@ enum Command {
     ///
     /// Probe, course and length, for a given error.
     Design(design::Arguments),
-    /// Participants and conditions from one file, in a balanced order
+    /// Participants and conditions of one file, in balanced order
     ///
     /// Each session leaves a recording that is never overwritten; the metrics come by condition.
     Study(study::Arguments),
@@ -208,6 +213,7 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Stability(arguments) => stability::run(arguments),
         Command::Lab(arguments) => lab::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
+        Command::IdentifyVehicle(arguments) => identify_vehicle::run(arguments),
         Command::Drivers(arguments) => drivers::run(arguments),
         Command::Design(arguments) => design::run(arguments),
         Command::Study(arguments) => study::run(arguments),

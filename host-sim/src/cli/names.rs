@@ -15,7 +15,7 @@ const GROUPS: [(&str, &str); 4] = [
         "Drive",
         "run sweep compare design-guidance adaptation course stability lab",
     ),
-    ("People", "identify drivers design study convert"),
+    ("People", "identify identify-vehicle drivers design study convert"),
     ("The ECU on a bus", "ecu"),
 ];
 
@@ -28,7 +28,7 @@ pub(super) fn grouped(program: clap::Command) -> clap::Command {
         let _ = writeln!(help, "\n{header}{title}:{header:#}");
         for command in names.split(' ').filter_map(|name| program.find_subcommand(name)) {
             let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-            let _ = writeln!(help, "  {literal}{:<15} {literal:#}{about}", command.get_name());
+            let _ = writeln!(help, "  {literal}{:<16} {literal:#}{about}", command.get_name());
         }
     }
     let _ = write!(help, "\n{header}Options:{header:#}\n{{options}}{{after-help}}");

@@ -1,8 +1,9 @@
-//! `cargo xtask validate`: the estimates of `identify` against drivers whose truth is known.
+//! `cargo xtask validate`: the estimates of `identify` and `identify-vehicle` against drivers and vehicles whose truth is known.
 
 use crate::reports::validation::Validation;
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
+use haptic_batch::vehicle::coverage;
 use haptic_evidence::estimates::{POPULATION, changes, corruptions, methods, recordings, repeat};
 
 use host_sim::cli::participants::Drives;
@@ -34,7 +35,12 @@ pub(crate) struct Arguments {
     /// a torsion bar that feels the wheel), read each as `identify --layout openlka` does, and count as --corruptions does
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
     recordings: Option<u32>,
-    /// Only those of --corruptions and --changes whose name holds this
+    /// Share N drives between CommonRoad's three vehicles, in a linear, a nonlinear and a disturbed world each; identify them as
+    /// `identify-vehicle` does, and ask how often the 95 % intervals hold the truth. Takes no participant and no probe. Exit code 1
+    /// if in the first two worlds those of a quantity surely hold it in fewer than 90 % (20 drives or more tell)
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["participant", "probe"])]
+    vehicles: Option<u32>,
+    /// Of --corruptions and --changes: only those whose name holds this
     #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings"])]
     only: String,
     #[command(flatten)]
@@ -57,6 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         arguments.methods,
         arguments.changes,
         arguments.recordings,
+        arguments.vehicles,
     ];
     let seeds = questions.into_iter().flatten().next().unwrap_or(1);
     let result = progress::watched("drives", |watch| -> Result<_, StudyError> {
@@ -68,6 +75,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, watch)?))
         } else if arguments.recordings.is_some() {
             Validation::Recordings(Box::new(recordings(&plan, seeds, watch)?))
+        } else if let Some(seeds) = arguments.vehicles {
+            Validation::Vehicles(coverage(u64::from(seeds), plan.seed, watch)?)
         } else {
             Validation::Methods(methods(&plan, seeds, watch)?)
         })

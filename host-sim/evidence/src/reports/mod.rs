@@ -7,3 +7,4 @@ pub(crate) mod handover;
 pub(crate) mod real_drives;
 pub(crate) mod reliance;
 pub(crate) mod validation;
+mod vehicle;

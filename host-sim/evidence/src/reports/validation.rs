@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::changes;
 use haptic_batch::experiment::ExperimentPlan;
+use haptic_batch::vehicle::VehicleCoverage;
 use haptic_evidence::estimates::{
     Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
 };
@@ -11,7 +12,7 @@ use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Panel, Series};
 use haptic_report::studies::place;
 
-/// One of the five questions that the validation asks, answered.
+/// One of the six questions that the validation asks, answered.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Validation {
@@ -26,6 +27,8 @@ pub(crate) enum Validation {
     /// What is identified from recordings like those of real people, and is anything of it wrong? Its corruptions are the
     /// ways of recording.
     Recordings(Box<Corruptions>),
+    /// Do the intervals of vehicles hold the truth as often as they say?
+    Vehicles(VehicleCoverage),
 }
 
 impl Validation {
@@ -36,6 +39,7 @@ impl Validation {
             Self::Corruptions(result) | Self::Recordings(result) => result.broken.clone(),
             Self::Changes(result) => result.broken.clone(),
             Self::Methods(_) => Vec::new(),
+            Self::Vehicles(result) => super::vehicle::off_coverage(result),
         }
     }
 
@@ -71,6 +75,7 @@ impl Validation {
             ),
             Self::Changes(r) => format!("{}. {}", of_plan(r.drives, &r.plan), changes::summary(r)),
             Self::Methods(r) => format!("{}.", of_plan(r.seeds, &r.plan)),
+            Self::Vehicles(r) => super::vehicle::coverage_summary(r),
             Self::Recordings(r) => format!(
                 "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
                  between it and the hands; each lane line has noise of 2 cm where nothing else is said.",
@@ -90,6 +95,7 @@ impl Validation {
             }
             Self::Changes(result) => vec![changes::table(result)],
             Self::Methods(result) => vec![methods_table(&result.lines)],
+            Self::Vehicles(result) => vec![super::vehicle::coverage_table(result)],
         }
     }
 
@@ -126,6 +132,11 @@ impl Validation {
                 "RMS errors by noise on the lane signals, as multiples of the information bound: the least of an unbiased estimator \
                  from exact ones. Beyond 6 bounds only the table shows them.",
             ),
+            Self::Vehicles(_) => (
+                "vehicles",
+                "Do the 95 % intervals of vehicles hold the truth?",
+                "Share of the identified values whose 95 % interval holds the truth.",
+            ),
         };
         let broken = self.broken().into_iter();
         let broken = broken.map(|line| Block::Text(format!("Not kept: {line}.")).on_page());
@@ -142,6 +153,7 @@ impl Validation {
             Self::Corruptions(result) | Self::Recordings(result) => corruptions_figure(result),
             Self::Changes(result) => changes::figure(result),
             Self::Methods(result) => methods_figure(&result.lines),
+            Self::Vehicles(result) => super::vehicle::coverage_figure(result),
         }
     }
 }
