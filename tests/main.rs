@@ -8,6 +8,7 @@ mod faults;
 mod faults_in_qemu;
 mod handover;
 mod identify_bus_trace;
+mod identify_causes;
 mod identify_changes;
 mod identify_degenerate;
 mod identify_foreign_logs;

@@ -27,12 +27,13 @@ const USUAL: f64 = 0.999;
 /// Before and after a jump the angle is taken over so long, s.
 const AROUND_S: f64 = 0.15;
 
-/// What the signals themselves refute; `signs_are_told` says that another test has found a swapped sign.
-pub(super) fn of_motion(log: &DriveLog, stretches: &[Range<usize>], signs_are_told: bool) -> Vec<Refutation> {
+/// What the signals themselves refute. The signs of the lane are looked at only where they `may_be_swapped`: in a drive without any
+/// weaving what is left beside the running means is the road's.
+pub(super) fn of_motion(log: &DriveLog, stretches: &[Range<usize>], may_be_swapped: bool) -> Vec<Refutation> {
     let mut out: Vec<Refutation> = dead(log).into_iter().collect();
     out.extend(unsigned(log));
     out.extend(jump(log, stretches));
-    if out.is_empty() && !signs_are_told {
+    if out.is_empty() && may_be_swapped {
         out.extend(lane_signs(log, stretches));
     }
     out

@@ -120,7 +120,9 @@ impl Problem<'_> {
             refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
         }
         let signs_are_told = refuted.iter().any(|r| r.assumption == verdict::SIGNS);
-        refuted.extend(of_motion(self.log, &self.stretches, signs_are_told));
+        // A swapped sign of the lane makes a driver who steers away from it.
+        let may_be_swapped = !signs_are_told && doubts.active.bounds.iter().any(|&(i, _)| i < K_HG);
+        refuted.extend(of_motion(self.log, &self.stretches, may_be_swapped));
         // Where a sensor is wrong, all that follows from it looks like another driver too.
         let change = change.filter(|_| refuted.is_empty());
         let mut others = verdict::of_residuals(

@@ -55,8 +55,8 @@ impl Problem<'_> {
                  estimated, held near {value} {unit} by {sd} {unit}. --fix {name}={value} keeps it."
             ));
             let [low, high] = T_NMS_RANGE_S;
-            if a.place == T_NMS && !(low - ROUNDING_S..=high + ROUNDING_S).contains(&drawn) {
-                let beyond = (low - drawn).max(drawn - high);
+            let beyond = (low - drawn).max(drawn - high);
+            if a.place == T_NMS && beyond > ROUNDING_S.max(error) {
                 let refutation = Refutation {
                     assumption: "t_nms is that of an arm",
                     evidence: format!(

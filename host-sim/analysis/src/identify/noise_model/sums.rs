@@ -59,7 +59,10 @@ impl Problem<'_> {
             }
             here.add(&block.columns, &block.errors);
         });
-        here.add_to(&mut all, place(stretch));
+        // A record of which nothing is used has no constant either.
+        if !self.stretches.is_empty() {
+            here.add_to(&mut all, place(stretch));
+        }
         all.hessian.fill_upper_triangle_with_lower_triangle();
         all.scale = all.loss.max(self.least_loss());
         all

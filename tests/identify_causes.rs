@@ -1,0 +1,106 @@
+//! Logs whose fault is not the driver's nor a torque sensor's: what is named, and that honest logs with a car of their own are not accused.
+
+use std::path::PathBuf;
+
+use haptic_analysis::identify::{DriveLog, Identification, Options, identify_with_noise_model};
+use haptic_batch::experiment::Recorder;
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::nonlinear::WorldParameters;
+use haptic_sim::participants::participants;
+use haptic_sim::scenario::Scenario;
+use haptic_sim::simulation;
+
+fn recorded() -> DriveLog {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/driver-logs/guided-probe.csv");
+    DriveLog::open(&path, false).unwrap()
+}
+
+fn fit(log: &DriveLog) -> Identification {
+    identify_with_noise_model(log, &Options::default())
+}
+
+/// What a log with one fault is told, and that nothing of it is identified.
+fn first_cause(spoil: impl Fn(&mut DriveLog)) -> String {
+    let mut log = recorded();
+    spoil(&mut log);
+    let found = fit(&log);
+    assert!(
+        found.parameters.list().iter().all(|p| !p.2.identified),
+        "{:?}",
+        found.refuted
+    );
+    found
+        .refuted
+        .first()
+        .map_or_else(String::new, |r| r.cause.clone())
+}
+
+fn negated(u: &mut [f64]) {
+    u.iter_mut().for_each(|x| *x = -*x);
+}
+
+#[test]
+fn what_is_wrong_with_a_signal_is_named() {
+    let faults: [(fn(&mut DriveLog), &str); 6] = [
+        (|log| log.e_y_m.fill(0.0), "e_y_m is dead"),
+        (
+            |log| log.driver_torque_nm.iter_mut().for_each(|t| *t = t.abs()),
+            "driver_torque_nm is recorded without its sign",
+        ),
+        (|log| negated(&mut log.e_y_m), "the sign of e_y_m is swapped"),
+        (
+            |log| negated(&mut log.e_theta_rad),
+            "the sign of e_theta_rad is swapped",
+        ),
+        (
+            |log| {
+                let half = log.len() / 2;
+                log.wheel_angle_rad[half..].iter_mut().for_each(|phi| *phi += 0.1);
+            },
+            "the sensor of the wheel angle got a new zero",
+        ),
+        (
+            |log| {
+                let half = log.len() / 2;
+                log.wheel_angle_rad[half..].iter_mut().for_each(|phi| *phi -= 0.1);
+            },
+            "the sensor of the wheel angle got a new zero",
+        ),
+    ];
+    for (spoil, says) in faults {
+        let cause = first_cause(spoil);
+        assert!(cause.starts_with(says), "{cause:?} where {says:?} is true");
+    }
+}
+
+/// A car whose column has 0.3 N.m of dry friction (Dahl) is no car with a wrong torque sensor.
+#[test]
+fn friction_accuses_no_sensor() {
+    let world = WorldParameters {
+        friction_nm: 0.3,
+        ..WorldParameters::default()
+    };
+    let truth = participants()[4].guided;
+    let driver = DriverParameters {
+        remnant_sd_nm: 0.1,
+        ..truth.parameters()
+    };
+    let scenario = Scenario::builder()
+        .driver(driver)
+        .gains(truth.gains())
+        .world(world)
+        .seed(4711)
+        .guidance(crate::probing());
+    let mut recorder = Recorder::new(true);
+    simulation::observe(&scenario.build().unwrap(), |outcome| recorder.observe(outcome));
+    let found = fit(&recorder.into_log());
+    assert!(found.refuted.is_empty(), "{:?}", found.refuted);
+    let [friction, _] = found.balance.unwrap().friction_nm.unwrap();
+    assert!((0.2..=0.35).contains(&friction), "{friction}");
+    let k_hg = found.parameters.k_hg;
+    let [low, high] = k_hg.interval_95.unwrap();
+    assert!(
+        k_hg.identified && (low..=high).contains(&truth.k_hg.unwrap()),
+        "{k_hg:?}"
+    );
+}
