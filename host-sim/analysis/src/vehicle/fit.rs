@@ -23,6 +23,9 @@ const STEPS: usize = 12;
 const SETTLED: f64 = 0.01;
 /// Damping from which on no step is found any more.
 const MOST_DAMPING: f64 = 1e8;
+/// Least variance of the noise: a record without any, such as a simulated drive on a straight, would be infinitely sure. No file
+/// has its values so exactly.
+const LEAST_VARIANCE: f64 = 1e-16;
 
 /// One list of values for each stretch of the record.
 pub(super) type Stretches = Vec<Vec<f64>>;
@@ -77,7 +80,7 @@ impl Noise {
             left.iter().map(one).sum::<f64>() / count as f64
         };
         let products: Vec<f64> = (0..=order).map(product).collect();
-        let (mut filter, mut variance) = (Vec::new(), products[0].max(f64::MIN_POSITIVE));
+        let (mut filter, mut variance) = (Vec::new(), products[0].max(LEAST_VARIANCE));
         for lag in 1..=order {
             let ahead: f64 = filter
                 .iter()
@@ -90,7 +93,7 @@ impl Noise {
                 *a -= reflection * other;
             }
             filter.push(reflection);
-            variance = (variance * (1.0 - reflection * reflection)).max(f64::MIN_POSITIVE);
+            variance = (variance * (1.0 - reflection * reflection)).max(LEAST_VARIANCE);
         }
         Self { filter, variance }
     }
@@ -193,7 +196,7 @@ pub(super) fn fit(
             noise = Noise::of(&difference(measured, &simulate(&at), 1.0));
         } else {
             let left = noise.whitened(&difference(measured, &simulate(&at), 1.0));
-            noise.variance = (dot(&left, &left) / left.len() as f64).max(f64::MIN_POSITIVE);
+            noise.variance = (dot(&left, &left) / left.len() as f64).max(LEAST_VARIANCE);
         }
         at = search(simulate, measured, at, steps, prior, &noise)?;
     }

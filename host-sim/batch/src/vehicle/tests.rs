@@ -74,7 +74,14 @@ fn best_without_column(found: &mut VehicleIdentification) {
 #[test]
 fn a_drive_without_excitation_identifies_nothing_of_the_vehicle_and_no_torque_nothing_of_the_column() {
     let known = Known::new(1200.0, 2.5).unwrap();
-    let found = identify(&on_rails(1e-6, 1.0), &known, 0.3).unwrap();
+    let mut silent = on_rails(0.0, 1.0);
+    silent.groups[0].channels[1].values.fill(0.0);
+    for recording in [silent, on_rails(1e-6, 1.0)] {
+        nothing_is_told(&identify(&recording, &known, 0.3).unwrap());
+    }
+}
+
+fn nothing_is_told(found: &VehicleIdentification) {
     for q in &found.quantities {
         let offset = q.name == "wheel_angle_offset";
         assert!(offset || q.verdict == Verdict::NotIdentified, "{q:?}");
