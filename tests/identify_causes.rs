@@ -39,9 +39,12 @@ fn negated(u: &mut [f64]) {
     u.iter_mut().for_each(|x| *x = -*x);
 }
 
+/// What is done to a log.
+type Spoiled = fn(&mut DriveLog);
+
 #[test]
 fn what_is_wrong_with_a_signal_is_named() {
-    let faults: [(fn(&mut DriveLog), &str); 6] = [
+    let faults: [(Spoiled, &str); 6] = [
         (|log| log.e_y_m.fill(0.0), "e_y_m is dead"),
         (
             |log| log.driver_torque_nm.iter_mut().for_each(|t| *t = t.abs()),

@@ -124,10 +124,10 @@ fn lagged(u: &[f64], dt: f64, t: f64) -> Vec<f64> {
 fn held(log: &DriveLog) -> Vec<f64> {
     let switches = Switches::of(log);
     let mut out = log.guidance_torque_nm.clone();
-    for k in 1..out.len() {
+    for (k, torque) in out.iter_mut().enumerate().skip(1) {
         let rise = switches.steps[k] - switches.steps[k - 1];
         if rise != 0.0 {
-            out[k] -= rise * (0.5 - switches.before_row_s(k, log.dt_s) / log.dt_s);
+            *torque -= rise * (0.5 - switches.before_row_s(k, log.dt_s) / log.dt_s);
         }
     }
     out

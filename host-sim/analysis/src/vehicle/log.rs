@@ -242,7 +242,7 @@ fn check_units(columns: &VehicleColumns, wheelbase_m: f64) -> Result<(), Vehicle
         return Err(VehicleError::Sign);
     }
     // Understeer makes the ratio look larger by up to a factor of three.
-    if ratio < RATIOS[0] || ratio > 3.0 * RATIOS[1] {
+    if !(RATIOS[0]..=3.0 * RATIOS[1]).contains(&ratio) {
         return Err(VehicleError::Unit { ratio });
     }
     Ok(())

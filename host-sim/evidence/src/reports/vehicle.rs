@@ -66,7 +66,7 @@ pub(super) fn coverage_figure(coverage: &VehicleCoverage) -> Figure {
         let rows = coverage.rows.iter().filter(|row| row.world == *world).enumerate();
         let aside = 0.2 * style as f64 - 0.2;
         let points = rows.filter_map(|(k, row)| Some((place(k) + aside, 100.0 * row.coverage?.0)));
-        Series::dots(*world, style, points.collect())
+        Series::dots(world, style, points.collect())
     });
     let panel = Axis::new("95 % intervals that hold the truth", "%").panel(series);
     Figure::of_rows(names, [panel])

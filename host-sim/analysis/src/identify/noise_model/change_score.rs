@@ -370,7 +370,7 @@ mod tests {
             "{power:?}"
         );
         assert!(
-            (power.blip.unwrap() - 6.28 / 6.4_f64.sqrt()).abs() < 1e-9,
+            (power.blip.unwrap() - (5.0 + 1.28) / 6.4_f64.sqrt()).abs() < 1e-9,
             "{power:?}"
         );
     }

@@ -118,14 +118,14 @@ impl<const N: usize> Block<N> {
         let (s, p) = (&problem.signals, point.p);
         let decay = (-s.dt_s / s.t_nms_s).exp();
         let rate = |raw: f64, lagged: f64| (raw - lagged) / s.t_nms_s;
-        for i in 0..self.count {
+        for (i, &arm) in arm.iter().enumerate().take(self.count) {
             let k = first + i;
             let h_rate = p[K_HG] * rate(s.guidance_raw[k], s.guidance[k]);
             let w_rate = p[K_NMS] * rate(s.wheel.raw[k], s.wheel.lagged[k]);
-            let lagged = slow.map_or(arm[i], |slow| decay * slow + (1.0 - decay) * arm[i]);
+            let lagged = slow.map_or(arm, |slow| decay * slow + (1.0 - decay) * arm);
             *slow = Some(lagged);
             self.columns[K_NMS][i] = -read(&s.wheel.lagged, k, point.late[1]);
-            self.columns[T_NMS][i] = -rate(arm[i], lagged);
+            self.columns[T_NMS][i] = -rate(arm, lagged);
             self.columns[H_LATE][i] = -h_rate;
             self.columns[D_LATE][i] = self.columns[T_P][i] + h_rate + w_rate;
         }
