@@ -297,8 +297,7 @@ impl Problem<'_> {
         let free: Vec<usize> = (0..self.size())
             .filter(|&i| self.is_free(i) && (i >= super::COUNT || !self.bounds[i].touches(p[i])))
             .collect();
-        let variance =
-            (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2));
+        let variance = self.error_variance(optimum);
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
         let all = self.alternatives(p, &free, variance);
         all.into_iter()
