@@ -345,10 +345,14 @@ impl<'a> Problem<'a> {
         (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2))
     }
 
+    /// Whether the driver may have a line of his own: it is not given, and e_y is a signal that he could keep beside.
     fn line_may_be_freed(&self) -> bool {
-        self.assumed
-            .iter()
-            .any(|a| [OWN_OFFSET, OWN_BEND].contains(&a.place))
+        let e_y = &self.log.e_y_m;
+        e_y.iter().any(|y| *y != e_y[0])
+            && self
+                .assumed
+                .iter()
+                .any(|a| [OWN_OFFSET, OWN_BEND].contains(&a.place))
     }
 
     /// Lets the driver have a line of his own, of which nothing is known but that it is in the lane.
