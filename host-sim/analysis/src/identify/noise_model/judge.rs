@@ -328,6 +328,15 @@ impl Problem<'_> {
             let step = a.step * share;
             let drawn_with = drawn_with.filter(|_| known.place == T_NMS);
             let with = |i: usize| drawn_with.map_or(0.0, |c| share * c[i]);
+            if known.place == K_NMS {
+                // K_d is what a gain leaves of K_nms, so their errors go together.
+                drawn[K_NMS] += step;
+                errors[(K_NMS, K_NMS)] += variance;
+                for i in (0..super::DRIVER).filter(|&i| self.is_free(i)) {
+                    errors[(i, K_NMS)] += variance * a.slopes[i];
+                    errors[(K_NMS, i)] += variance * a.slopes[i];
+                }
+            }
             for i in (0..super::DRIVER).filter(|&i| self.is_free(i)) {
                 drawn[i] += a.slopes[i] * step;
                 for j in (0..super::DRIVER).filter(|&j| self.is_free(j)) {
