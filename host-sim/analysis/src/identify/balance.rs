@@ -63,6 +63,9 @@ pub struct Balance {
     /// Dry friction of the column, and its standard error, N.m; none where there is none to be seen. The rest is then of the
     /// rows in which the wheel slides.
     pub friction_nm: Option<[f64; 2]>,
+    /// What T_d has beyond that, and its standard error, N.m: the sensor's offset, and that of the wheel angle and of the road.
+    #[serde(skip)]
+    pub(crate) offset_nm: [f64; 2],
     /// Seconds that all this rests on.
     pub seconds: f64,
 }
@@ -253,6 +256,7 @@ fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Opt
             between_s: between,
             stiffness: [stiffness, variance.max(0.0).sqrt()],
             friction_nm: Some([fit.weights[d - 1], error(d - 1)]),
+            offset_nm: [fit.weights[d - 2], error(d - 2)],
             seconds: rows.len() as f64 * dt,
         });
         if driver_late.abs() > 0.3 || guidance_late.abs() > 0.3 || (step.abs() < 5e-4 && more.abs() < 5e-4) {

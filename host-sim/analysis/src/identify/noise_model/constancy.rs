@@ -21,7 +21,7 @@ use super::change_score::{BLOCK_S, Block, Fitted, Freed, LOCAL, Local, OFFSET, m
 use super::delays::Line;
 use super::sums::Rows;
 use super::{K_HG, OWN_OFFSET, Problem, T_P};
-use crate::identify::balance::balance;
+use crate::identify::balance::{Balance, balance};
 use crate::identify::change::{Change, Constancy, E_Y, T_D};
 use crate::identify::result::Refutation;
 use crate::identify::search::covariance;
@@ -116,6 +116,33 @@ impl Problem<'_> {
     /// Whether the balance of the column's torques shows that a sensor changed, before against after the middle of a
     /// change.
     pub(super) fn changed_sensor(&self, change: &Change, manual: bool) -> Option<Refutation> {
+        let [before, after] = &self.balances(change, manual)?;
+        verdict::of_changed_sensor(change, self.span_s(), [before, after])
+    }
+
+    /// Whether the torque sensor's offset changed, rather than that the driver keeps a line of his own: a line is a slope of the
+    /// torque, and looks like an offset that drifts. The balance of the column's torques tells one from the other, for whatever
+    /// torque a driver makes turns the wheel; where it cannot be weighed, the likelier of the two is taken. `line` is what a line
+    /// adds to twice the log likelihood.
+    pub(super) fn torque_moves(&self, p: &[f64], variance: f64, line: f64, manual: bool) -> bool {
+        let mut unused = DMatrix::zeros(self.size(), self.size());
+        let change = self.constancy(p, variance, &mut unused).and_then(|c| c.change);
+        let Some(change) = change.filter(|c| c.parameter == T_D) else {
+            return false;
+        };
+        let seen = |b: &Balance| b.explained >= verdict::BALANCE_SEEN;
+        match self.balances(&change, manual) {
+            Some(sides) if sides.iter().all(seen) => {
+                let [[was, error_was], [is, error]] = sides.map(|b| b.offset_nm);
+                let moved = is - was;
+                moved * change.by > 0.0 && moved.abs() > verdict::CERTAIN * error.hypot(error_was)
+            }
+            _ => change.deviance > line,
+        }
+    }
+
+    /// The balances of the column's torques before and after the middle of a change.
+    fn balances(&self, change: &Change, manual: bool) -> Option<[Balance; 2]> {
         let middle_s = 0.5 * (change.at_s[0] + change.at_s[1]);
         let side = |rows: Range<usize>| {
             let cut = |s: &Range<usize>| s.start.max(rows.start)..s.end.min(rows.end);
@@ -123,8 +150,7 @@ impl Problem<'_> {
             balance(self.log, &cut.collect::<Vec<_>>(), manual)
         };
         let middle = ((middle_s - self.log.start_s) / self.log.dt_s).max(0.0) as usize;
-        let sides = [side(0..middle)?, side(middle..self.log.len())?];
-        verdict::of_changed_sensor(change, self.span_s(), [&sides[0], &sides[1]])
+        Some([side(0..middle)?, side(middle..self.log.len())?])
     }
 
     /// First and last time of the rows in use, s.

@@ -297,8 +297,7 @@ impl Problem<'_> {
         let free: Vec<usize> = (0..self.size())
             .filter(|&i| self.is_free(i) && (i >= super::COUNT || !self.bounds[i].touches(p[i])))
             .collect();
-        let variance =
-            (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2));
+        let variance = self.error_variance(optimum);
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
         let all = self.alternatives(p, &free, variance);
         all.into_iter()
@@ -329,6 +328,15 @@ impl Problem<'_> {
             let step = a.step * share;
             let drawn_with = drawn_with.filter(|_| known.place == T_NMS);
             let with = |i: usize| drawn_with.map_or(0.0, |c| share * c[i]);
+            if known.place == K_NMS {
+                // K_d is what a gain leaves of K_nms, so their errors go together.
+                drawn[K_NMS] += step;
+                errors[(K_NMS, K_NMS)] += variance;
+                for i in (0..super::DRIVER).filter(|&i| self.is_free(i)) {
+                    errors[(i, K_NMS)] += variance * a.slopes[i];
+                    errors[(K_NMS, i)] += variance * a.slopes[i];
+                }
+            }
             for i in (0..super::DRIVER).filter(|&i| self.is_free(i)) {
                 drawn[i] += a.slopes[i] * step;
                 for j in (0..super::DRIVER).filter(|&j| self.is_free(j)) {

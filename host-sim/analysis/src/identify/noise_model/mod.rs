@@ -159,13 +159,20 @@ pub(crate) fn identify_prepared(prepared: &Prepared, options: &Options) -> Ident
     let mut problem = Problem::new(prepared, options);
     let (optimum, starts) = problem.search();
     problem.assume_muscle(&optimum.point);
-    if problem.line_is_evident(&optimum) {
+    let line = problem.gain_of_line(&optimum).filter(|gain| *gain > LINE_LEVEL);
+    let torque_moves = |gain: f64| {
+        let variance = problem.error_variance(&optimum);
+        problem.torque_moves(&optimum.point, variance, gain, options.manual)
+    };
+    if line.is_some_and(|gain| !torque_moves(gain)) {
         return problem.with_line(prepared, options);
     }
     let found = problem.found(prepared, options, optimum, starts);
-    // Before a line is said to move, it may be another one than the target line throughout.
+    // Before a line is said to move, it may be another one than the target line throughout; and one that is evident is left out only
+    // where something else is refuted in its place.
     let moves = found.refuted.iter().any(|r| r.assumption == SAME_LINE);
-    if moves && problem.line_may_be_freed() {
+    let is_left_out = line.is_some() && found.refuted.is_empty();
+    if (moves || is_left_out) && problem.line_may_be_freed() {
         return Problem::new(prepared, options).with_line(prepared, options);
     }
     found
@@ -306,8 +313,12 @@ impl<'a> Problem<'a> {
         freed
     }
 
-    /// Whether a line of the driver's own explains more than chance does, with all else that is linear following.
-    fn line_is_evident(&self, optimum: &Optimum) -> bool {
+    /// What a line of the driver's own would add to twice the log likelihood, with all else that is linear following; none where
+    /// the line is given.
+    fn gain_of_line(&self, optimum: &Optimum) -> Option<f64> {
+        if !self.line_may_be_freed() {
+            return None;
+        }
         let p = &optimum.point;
         let mut bounds = self.bounds.clone();
         let own = || {
@@ -327,15 +338,21 @@ impl<'a> Problem<'a> {
                 -q.gradient.dot(&d) - 0.5 * d.dot(&(&q.hessian * &d))
             })
             .sum();
-        let variance =
-            (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2));
-        self.line_may_be_freed() && 2.0 * gain / variance > LINE_LEVEL
+        Some(2.0 * gain / self.error_variance(optimum))
     }
 
+    fn error_variance(&self, optimum: &Optimum) -> f64 {
+        (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2))
+    }
+
+    /// Whether the driver may have a line of his own: it is not given, and e_y is a signal that he could keep beside.
     fn line_may_be_freed(&self) -> bool {
-        self.assumed
-            .iter()
-            .any(|a| [OWN_OFFSET, OWN_BEND].contains(&a.place))
+        let e_y = &self.log.e_y_m;
+        e_y.iter().any(|y| *y != e_y[0])
+            && self
+                .assumed
+                .iter()
+                .any(|a| [OWN_OFFSET, OWN_BEND].contains(&a.place))
     }
 
     /// Lets the driver have a line of his own, of which nothing is known but that it is in the lane.

@@ -25,6 +25,9 @@ use crate::identify::result::{
 };
 use crate::identify::search::{Bounds, Optimum};
 
+/// Place of K_d in table 4.
+const TABLE_4_K_D: usize = 4;
+
 /// The driver's parameters, and what else was estimated, as a result names them.
 struct Named {
     parameters: Parameters,
@@ -114,7 +117,12 @@ impl Problem<'_> {
             }
         };
         let gains = [0, 1, 2].map(parameter);
-        let split = split_scale(&gains, &found.active.pull, &found.errors, options);
+        let spread = Spread {
+            pull: &found.active.pull,
+            errors: &found.errors,
+            drawn: &found.drawn,
+        };
+        let split = split_scale(&gains, &spread, p[K_NMS], options);
         let (k_d, a) = split
             .clone()
             .unwrap_or((Parameter::ABSENT, [Parameter::ABSENT; 3]));
@@ -336,17 +344,26 @@ impl Problem<'_> {
     }
 }
 
+/// What is known of the estimates together.
+struct Spread<'a> {
+    /// How far the unbounded optimum is from the bounded one.
+    pull: &'a DVector<f64>,
+    /// Their covariance, that of K_nms with them among it.
+    errors: &'a DMatrix<f64>,
+    /// How far what the record says of the muscle moves each of them.
+    drawn: &'a DVector<f64>,
+}
+
 /// Splits the gains with what the caller knows of the scale: K_d, or one a_i.
 ///
 /// # Errors
 /// The a_i given would need a K_d that is not above zero.
 fn split_scale(
     gains: &[Parameter; 3],
-    pull: &DVector<f64>,
-    errors: &DMatrix<f64>,
+    &Spread { pull, errors, drawn }: &Spread<'_>,
+    k_nms: f64,
     options: &Options,
 ) -> Result<(Parameter, [Parameter; 3]), FixError> {
-    let k_nms = options.muscle.k_nms;
     if let Some(k_d) = options.k_d {
         return Ok((
             Parameter::fixed(k_d),
@@ -367,12 +384,20 @@ fn split_scale(
             n = known + 1
         )));
     }
-    let sum = gains[known].scaled(1.0 / a);
-    let k_d = Parameter {
-        estimate: sum.estimate.map(|x| x - k_nms),
-        interval_95: sum.interval_95.map(|i| i.map(|x| x - k_nms)),
-        optimum: Some(k_d),
-        ..sum
+    let k_d = if gains[known].standard_error.is_none() {
+        Parameter::not_identified(k_d, Bounds::FREE)
+    } else {
+        // A stiffer arm takes more of K_d + K_nms, and makes the gain larger by nearly as much.
+        let with_k_nms = errors[(known, known)] / (a * a) - 2.0 * errors[(known, K_NMS)] / a;
+        let (_, low, high) = TABLE_4[TABLE_4_K_D];
+        Parameter::estimated(
+            k_d,
+            pull[known] / a,
+            with_k_nms + errors[(K_NMS, K_NMS)],
+            drawn[known] / a - drawn[K_NMS],
+            Bounds::new(0.0, f64::INFINITY),
+            high - low,
+        )
     };
     let split = |i: usize| {
         if i == known {
@@ -437,9 +462,25 @@ mod tests {
         let mut options = Options::default();
         options.fix("a_3=3.75").unwrap();
         let gains = [gain(0.4), gain(0.04), gain(15.0)];
-        let pull = DVector::zeros(COUNT);
-        let (k_d, [a_1, _, a_3]) = split_scale(&gains, &pull, &errors, &options).unwrap();
+        let known_arm = errors.clone();
+        // K_nms known to 0.25: gain_3 rises by 3 for each unit, so gain_3 has 0.75^2 more, and K_d =
+        // gain_3/3.75 - K_nms falls by 0.2 for each unit: 0.05^2 beside 0.09/3.75^2 = 0.08^2.
+        errors[(2, 2)] = 0.09 + 0.75 * 0.75;
+        errors[(K_NMS, K_NMS)] = 0.0625;
+        errors[(2, K_NMS)] = 0.1875;
+        errors[(K_NMS, 2)] = 0.1875;
+        let none = DVector::zeros(COUNT);
+        let spread = |errors| Spread {
+            pull: &none,
+            errors,
+            drawn: &none,
+        };
+        let (k_d, _) = split_scale(&gains, &spread(&errors), 1.0, &options).unwrap();
+        assert!((k_d.standard_error.unwrap() - 0.05_f64.hypot(0.08)).abs() < 1e-9 && k_d.identified);
+
+        let (k_d, [a_1, _, a_3]) = split_scale(&gains, &spread(&known_arm), 1.0, &options).unwrap();
         assert!((k_d.optimum.unwrap() - 3.0).abs() < 1e-12 && a_3.fixed);
+        assert!((k_d.standard_error.unwrap() - 0.08).abs() < 1e-9);
         assert!((a_1.optimum.unwrap() - 0.1).abs() < 1e-12);
         assert!((a_1.standard_error.unwrap() - 0.002_404_f64.sqrt()).abs() < 1e-9);
     }
@@ -450,8 +491,13 @@ mod tests {
         let mut options = Options::default();
         options.fix("a_3=50").unwrap();
         let gains = [gain(0.4), gain(0.04), gain(15.0)];
-        let (pull, errors) = (DVector::zeros(COUNT), DMatrix::zeros(COUNT, COUNT));
-        let FixError(error) = split_scale(&gains, &pull, &errors, &options).unwrap_err();
+        let (none, errors) = (DVector::zeros(COUNT), DMatrix::zeros(COUNT, COUNT));
+        let spread = Spread {
+            pull: &none,
+            errors: &errors,
+            drawn: &none,
+        };
+        let FixError(error) = split_scale(&gains, &spread, 1.0, &options).unwrap_err();
         assert!(
             error.contains("a_3 = 50") && error.contains("k_d -0.7"),
             "{error}"
