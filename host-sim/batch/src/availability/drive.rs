@@ -41,22 +41,21 @@ pub(super) fn side_by_side(
         most_s: Some(SEGMENT_S as u32),
         ..Options::default()
     };
-    let hand = |place: usize| by_hand(&guided[place]);
     let hands = part
         .group(&manual)
-        .measured(options, hand, |_, run| Ok(ByHand::new(run)))?;
-    let hands: Vec<ByHand> = (hands.into_iter().enumerate())
-        .map(|(place, found)| found.unwrap_or_else(|| ByHand::new(&hand(place))))
+        .measured(options, by_hand, |_, run| Ok(ByHand::new(run)))?;
+    let hands: Vec<ByHand> = (hands.into_iter().zip(&manual))
+        .map(|(found, scenario)| found.unwrap_or_else(|| ByHand::new(&by_hand(scenario))))
         .collect();
     let judge = |place: usize, run: &Run, reported| -> Result<DriveSegment, StudyError> {
         let segment = segments[place].segment(&guided[place], run, reported, hands[place]);
         part.done(place, &segment)?;
         Ok(segment)
     };
-    let ecu = |place: usize| with_ecu(&guided[place], Happens::default());
+    let ecu = |scenario: &Scenario| with_ecu(scenario, Happens::default());
     let judged = part.group(&guided).measured(
         options,
-        |place| ecu(place).0,
+        |scenario| ecu(scenario).0,
         |place, run| {
             let reported = Reported {
                 active: run.steps,
@@ -71,15 +70,16 @@ pub(super) fn side_by_side(
         .map(|(place, judged)| match judged {
             Some(segment) => Ok(segment),
             None => {
-                let (run, reported) = ecu(place);
+                let (run, reported) = ecu(&guided[place]);
                 judge(place, &run, reported)
             }
         });
     judged.collect()
 }
 
-/// The driver without guidance: what this driver would make of its torque does not matter where there is none.
-fn manual(scenario: &Scenario) -> Result<Scenario, StudyError> {
+/// The segment's driver by hand, whose K_hg is 0: there is no guidance to work against, and a motor's ripple, which is there
+/// all the same, is none.
+pub(super) fn manual(scenario: &Scenario) -> Result<Scenario, StudyError> {
     let gains = ArmGains {
         k_hg: 0.0,
         ..scenario.gains()
@@ -88,7 +88,7 @@ fn manual(scenario: &Scenario) -> Result<Scenario, StudyError> {
     Ok(manual.build()?)
 }
 
-/// A segment's drive by hand.
+/// A segment's drive by hand, of what [`manual`] makes of its scenario.
 pub(super) fn by_hand(scenario: &Scenario) -> Run {
     let mut simulation = Simulation::with(scenario, NoGuidance);
     let mut samples = empty_samples();

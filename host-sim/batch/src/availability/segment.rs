@@ -10,7 +10,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::drive::{by_hand, with_ecu};
+use super::drive::{by_hand, manual, with_ecu};
 use super::roads::falling_and_rising;
 use super::{CARS, Road, WorldKind};
 use crate::declared::{Declaration, Reported};
@@ -140,7 +140,8 @@ impl SegmentNumber {
     pub fn drive(&self, root: u64) -> Result<DriveSegment, StudyError> {
         let scenario = self.scenario(root)?;
         let (run, reported) = with_ecu(&scenario, self.world.happens());
-        Ok(self.segment(&scenario, &run, reported, ByHand::new(&by_hand(&scenario))))
+        let by_hand = ByHand::new(&by_hand(&manual(&scenario)?));
+        Ok(self.segment(&scenario, &run, reported, by_hand))
     }
 
     /// What two drives showed.

@@ -2,7 +2,7 @@ use haptic_sim::scenario::Speed;
 use haptic_sim::worlds::WORLDS;
 
 use super::*;
-use crate::engine::{Watch, run};
+use crate::engine::{Watch, on_threads, run};
 
 /// Exact limits of a Poisson count as tables print them (Garwood 1936; Ulm 1990): 0 to 3.689, 0.0253 to 5.572, 4.795 to
 /// 18.39, 81.36 to 121.63; and three for the one-sided limit of none.
@@ -273,11 +273,12 @@ fn braking_in_a_real_world_is_no_fault() {
     assert!(active_s > 1790.0, "{active_s}");
 }
 
-/// Every field of every segment: side by side as alone with the shipping ECU, where all can be vectorised, where none can for the
-/// camera, and where some drives are rejected.
+/// Every field of every segment: side by side as alone with the shipping ECU, where all can be vectorised, where a motor ripples
+/// though nobody guides, where no guided drive can for the camera, and where some drives are rejected. One thread drives: a part
+/// of one drive is not driven side by side.
 #[test]
 fn legs_are_the_same_side_by_side() {
-    for name in ["calibrated", "everything", "camera", "slippery"] {
+    for name in ["calibrated", "everything", "motor", "camera", "slippery"] {
         let world = WORLDS.iter().find(|world| world.name == name).unwrap();
         let plan = AvailabilityPlan {
             worlds: vec![world],
@@ -290,7 +291,8 @@ fn legs_are_the_same_side_by_side() {
             found.lock().unwrap().push(segment.clone());
             Ok(())
         };
-        run(&plan, &resumed(&[], keep), &Watch::nobody()).unwrap();
+        let study = || run(&plan, &resumed(&[], keep), &Watch::nobody());
+        on_threads(Some(1), study).unwrap().unwrap();
         let found = found.into_inner().unwrap();
         assert_eq!(found.len(), 2, "{name}");
         for segment in &found {

@@ -101,11 +101,12 @@ impl<C: Sync, R: Send> Part<'_, C, R> {
             self.done(place, &row)?;
             Ok(row)
         };
-        let alone = |place: usize| simulate(&scenarios[place]);
-        let found = self.group(&scenarios).measured(Options::default(), alone, row)?;
+        let found = self
+            .group(&scenarios)
+            .measured(Options::default(), simulate, row)?;
         let found = found.into_par_iter().enumerate();
         found
-            .map(|(place, found)| found.map_or_else(|| row(place, &alone(place)), Ok))
+            .map(|(place, found)| found.map_or_else(|| row(place, &simulate(&scenarios[place])), Ok))
             .collect()
     }
 
@@ -130,18 +131,19 @@ impl<C: Sync, R: Send> Part<'_, C, R> {
         };
         let mut recorders = vec![Recorder::new(true); scenarios.len()];
         let mut rows: Vec<Option<R>> = scenarios.iter().map(|_| None).collect();
-        let alone = |place: usize| simulate(&scenarios[place]);
-        let rejected = self.group(&scenarios).run_batch(options, alone, |place, event| {
-            match event {
-                Event::Steps(steps) => steps.iter().for_each(|step| recorders[place].take(*step)),
-                Event::Ended(run) => {
-                    let recorder = std::mem::replace(&mut recorders[place], Recorder::new(true));
-                    rows[place] = Some(row(place, run, recorder.into_log())?);
+        let rejected = self
+            .group(&scenarios)
+            .run_batch(options, simulate, |place, event| {
+                match event {
+                    Event::Steps(steps) => steps.iter().for_each(|step| recorders[place].take(*step)),
+                    Event::Ended(run) => {
+                        let recorder = std::mem::replace(&mut recorders[place], Recorder::new(true));
+                        rows[place] = Some(row(place, run, recorder.into_log())?);
+                    }
+                    Event::Rejected(_) => (),
                 }
-                Event::Rejected(_) => (),
-            }
-            Ok(())
-        })?;
+                Ok(())
+            })?;
         for place in rejected {
             let (run, log) = recorded(&scenarios[place]);
             rows[place] = Some(row(place, &run, log)?);

@@ -51,15 +51,15 @@ pub(crate) struct Group<'a> {
 }
 
 impl Group<'_> {
-    /// Drives side by side; gives the places of those that are rejected. `alone` is a run by the shipping ECU, against which
-    /// some are held.
+    /// Drives side by side; gives the places of those that are rejected. `alone` is a scenario's run by the shipping ECU,
+    /// against which some are held.
     ///
     /// # Errors
     /// A run that differs from the shipping ECU's; what `on` says.
     pub(crate) fn run_batch(
         &self,
         options: Options,
-        alone: impl Fn(usize) -> Run,
+        alone: impl Fn(&Scenario) -> Run,
         on: impl FnMut(usize, Event) -> Result<(), StudyError>,
     ) -> Result<Vec<usize>, StudyError> {
         let too_few = self.scenarios.len() < FEWEST;
@@ -80,7 +80,7 @@ impl Group<'_> {
     fn with(
         &self,
         drive: impl FnOnce(&mut dyn FnMut(usize, Event)),
-        alone: impl Fn(usize) -> Run,
+        alone: impl Fn(&Scenario) -> Run,
         mut on: impl FnMut(usize, Event) -> Result<(), StudyError>,
     ) -> Result<Vec<usize>, StudyError> {
         let (mut rejected, mut result) = (Vec::new(), Ok(()));
@@ -94,7 +94,8 @@ impl Group<'_> {
                     return;
                 }
                 (Ok(()), Event::Ended(run)) if self.checked.has(number) => {
-                    agree(number, run, &alone(place)).and_then(|()| on(place, Event::Ended(run)))
+                    agree(number, run, &alone(&self.scenarios[place]))
+                        .and_then(|()| on(place, Event::Ended(run)))
                 }
                 (Ok(()), event) => on(place, event),
             };
@@ -112,7 +113,7 @@ impl Group<'_> {
     pub(crate) fn measured<T>(
         &self,
         options: Options,
-        alone: impl Fn(usize) -> Run,
+        alone: impl Fn(&Scenario) -> Run,
         mut measure: impl FnMut(usize, &Run) -> Result<T, StudyError>,
     ) -> Result<Vec<Option<T>>, StudyError> {
         let mut found: Vec<Option<T>> = self.scenarios.iter().map(|_| None).collect();

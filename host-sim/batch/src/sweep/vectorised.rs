@@ -68,8 +68,7 @@ impl Sweep {
             first,
             checked: Checked::new(self.seed, self.drives()),
         };
-        let alone = |place: usize| simulate(&scenarios[place]);
-        let found = group.measured(Options::default(), alone, |place, run| Ok(measure(place, run)));
+        let found = group.measured(Options::default(), simulate, |place, run| Ok(measure(place, run)));
         found.map_err(|e| InputError::new(&self.name, e))
     }
 }
