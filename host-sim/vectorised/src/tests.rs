@@ -11,10 +11,12 @@ use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::nonlinear::{Tyres, WorldParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::models::tolerances::Tolerances;
+use haptic_sim::population::LaneKeeper;
 use haptic_sim::scenario::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors, Speed,
 };
 use haptic_sim::simulation::simulate;
+use haptic_sim::worlds::{WORLDS, WorldKind};
 
 /// Every field of every sample, signs of zeros included.
 fn bits(run: &Run) -> Vec<u64> {
@@ -276,6 +278,51 @@ fn speeds_that_change_are_the_same_side_by_side_and_few_are_suspect() {
     let all: Beside = |builder, between| changing(nonlinear(erring(builder, between), between), between);
     let suspects = compare(&random(40, 9, all), Width::Widest);
     assert!(suspects < 30, "{suspects} of 40");
+}
+
+/// A driver who keeps the lane, with guidance and by hand, in a car of a world on a road.
+fn pair_in(world: &WorldKind, course: &Course, number: u64) -> [Scenario; 2] {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(number);
+    let first_kmh: f64 = random.random_range(60.0..80.0);
+    let speed = if world.changes_speed() {
+        let kmh = [1.0, 1.0, 0.6, 0.6, 0.9].map(|share| share * first_kmh);
+        Speed::by_time_kmh(vec![0.0, 4.0, 8.0, 12.0, 20.0], &kmh)
+    } else {
+        Speed::constant_kmh(first_kmh)
+    };
+    let builder = Scenario::builder().course(course.clone()).speed(speed);
+    let guided = LaneKeeper::draw(&mut random, 0.36)
+        .drives(builder, first_kmh / 3.6)
+        .world(world.parameters())
+        .tolerances(world.tolerances(number))
+        .sensor_errors(world.sensor_errors())
+        .seed(number);
+    let k_d = guided.clone().build().unwrap().gains().k_d;
+    let by_hand = guided.clone().condition(Condition::Manual);
+    let by_hand = by_hand.gains(ArmGains { k_d, k_hg: 0.0 });
+    [guided, by_hand].map(|builder| builder.build().unwrap())
+}
+
+/// Each world that has a name, on a level road and on one that lies aslant. Where the camera is late or blind nobody is guided
+/// side by side.
+#[test]
+fn every_named_world_is_the_same_side_by_side() {
+    for world in &WORLDS {
+        let roads = [short_course(), banked_course()];
+        let numbers = roads
+            .iter()
+            .flat_map(|road| (0..2).map(move |number| (road, number)));
+        let (guided, by_hand): (Vec<_>, Vec<_>) = numbers
+            .map(|(road, number)| <(Scenario, Scenario)>::from(pair_in(world, road, number)))
+            .unzip();
+        let rejected = [guided, by_hand].map(|scenarios| compare(&scenarios, Width::Widest));
+        let of_guided = if ["camera", "blind"].contains(&world.name) {
+            4
+        } else {
+            0
+        };
+        assert_eq!(rejected, [of_guided, 0], "{}", world.name);
+    }
 }
 
 /// Every step that is reported, and the samples of runs that are cut after 7 s, against the shipping ECU.
