@@ -122,23 +122,20 @@ impl Problem<'_> {
 
     /// Whether the torque sensor's offset changed, rather than that the driver keeps a line of his own: a line is a slope of the
     /// torque, and looks like an offset that drifts. The balance of the column's torques tells one from the other, for whatever
-    /// torque a driver makes turns the wheel; where it cannot be weighed, the likelier of the two is taken. `line` is what a line
-    /// adds to twice the log likelihood.
-    pub(super) fn torque_moves(&self, p: &[f64], variance: f64, line: f64, manual: bool) -> bool {
+    /// torque a driver makes turns the wheel; where it cannot be weighed, nothing does, and it is a line.
+    pub(super) fn torque_moves(&self, p: &[f64], variance: f64, manual: bool) -> bool {
         let mut unused = DMatrix::zeros(self.size(), self.size());
         let change = self.constancy(p, variance, &mut unused).and_then(|c| c.change);
         let Some(change) = change.filter(|c| c.parameter == T_D) else {
             return false;
         };
-        let seen = |b: &Balance| b.explained >= verdict::BALANCE_SEEN;
-        match self.balances(&change, manual) {
-            Some(sides) if sides.iter().all(seen) => {
-                let [[was, error_was], [is, error]] = sides.map(|b| b.offset_nm);
-                let moved = is - was;
-                moved * change.by > 0.0 && moved.abs() > verdict::CERTAIN * error.hypot(error_was)
-            }
-            _ => change.deviance > line,
-        }
+        let weighed = |b: &Balance| b.explained >= verdict::BALANCE_SEEN;
+        let sides = self.balances(&change, manual);
+        sides.filter(|s| s.iter().all(weighed)).is_some_and(|sides| {
+            let [[was, error_was], [is, error]] = sides.map(|b| b.offset_nm);
+            let moved = is - was;
+            moved * change.by > 0.0 && moved.abs() > verdict::CERTAIN * error.hypot(error_was)
+        })
     }
 
     /// The balances of the column's torques before and after the middle of a change.

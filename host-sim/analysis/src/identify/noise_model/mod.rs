@@ -159,19 +159,16 @@ pub(crate) fn identify_prepared(prepared: &Prepared, options: &Options) -> Ident
     let mut problem = Problem::new(prepared, options);
     let (optimum, starts) = problem.search();
     problem.assume_muscle(&optimum.point);
-    let line = problem.gain_of_line(&optimum).filter(|gain| *gain > LINE_LEVEL);
-    let torque_moves = |gain: f64| {
-        let variance = problem.error_variance(&optimum);
-        problem.torque_moves(&optimum.point, variance, gain, options.manual)
-    };
-    if line.is_some_and(|gain| !torque_moves(gain)) {
+    let is_line = problem.line_is_evident(&optimum);
+    let variance = problem.error_variance(&optimum);
+    if is_line && !problem.torque_moves(&optimum.point, variance, options.manual) {
         return problem.with_line(prepared, options);
     }
     let found = problem.found(prepared, options, optimum, starts);
     // Before a line is said to move, it may be another one than the target line throughout; and one that is evident is left out only
     // where something else is refuted in its place.
     let moves = found.refuted.iter().any(|r| r.assumption == SAME_LINE);
-    let is_left_out = line.is_some() && found.refuted.is_empty();
+    let is_left_out = is_line && found.refuted.is_empty();
     if (moves || is_left_out) && problem.line_may_be_freed() {
         return Problem::new(prepared, options).with_line(prepared, options);
     }
@@ -313,12 +310,8 @@ impl<'a> Problem<'a> {
         freed
     }
 
-    /// What a line of the driver's own would add to twice the log likelihood, with all else that is linear following; none where
-    /// the line is given.
-    fn gain_of_line(&self, optimum: &Optimum) -> Option<f64> {
-        if !self.line_may_be_freed() {
-            return None;
-        }
+    /// Whether a line of the driver's own explains more than chance does, with all else that is linear following.
+    fn line_is_evident(&self, optimum: &Optimum) -> bool {
         let p = &optimum.point;
         let mut bounds = self.bounds.clone();
         let own = || {
@@ -338,7 +331,7 @@ impl<'a> Problem<'a> {
                 -q.gradient.dot(&d) - 0.5 * d.dot(&(&q.hessian * &d))
             })
             .sum();
-        Some(2.0 * gain / self.error_variance(optimum))
+        self.line_may_be_freed() && 2.0 * gain / self.error_variance(optimum) > LINE_LEVEL
     }
 
     fn error_variance(&self, optimum: &Optimum) -> f64 {
