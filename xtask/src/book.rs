@@ -22,7 +22,7 @@ const OUTSIDE: &str = "repository";
 const PRINTED: [&str; 2] = ["<!-- printed: ", " -->"];
 /// The commands that print a table for the book.
 const REQUIREMENTS: &str = "cargo xtask trace --page";
-const FAULTS: &str = "host-sim faults --list";
+const FAULTS: &str = "cargo xtask faults --list";
 
 /// Makes the book in `target/book/html`; an error names links that lead nowhere.
 pub(crate) fn build() -> Result<()> {
@@ -99,7 +99,7 @@ fn with_printed(text: &str) -> Result<String> {
             None => made.push_str(line),
             Some(REQUIREMENTS) => made.push_str(&trace::page()?),
             Some(FAULTS) => {
-                let program = Built::Daily.host_sim()?;
+                let program = Built::Daily.evidence()?;
                 made.push_str(&output(
                     command(&program.to_string_lossy()).args(["faults", "--list"]),
                 )?);

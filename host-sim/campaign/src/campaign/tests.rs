@@ -70,7 +70,7 @@ fn who_does_not_decide_where_the_vehicle_goes_is_not_judged() {
     assert_eq!((row.beyond_drop, row.beyond_limit), (1, 0));
 }
 
-/// The answers follow from the reactions that `host-sim faults --list` prints.
+/// The answers follow from the reactions that `cargo xtask faults --list` prints.
 #[test]
 fn guidance_may_end_where_something_is_wrong() {
     for (name, may_leave) in [
