@@ -20,7 +20,7 @@ pub(crate) const BUDGETS: [(&str, usize); 21] = [
     ("firmware", 2_700),
     ("firmware/lockstep", 200),
     ("host-sim", 2_700),
-    ("host-sim/analysis", 11_300),
+    ("host-sim/analysis", 11_400),
     ("host-sim/batch", 10_600),
     ("host-sim/campaign", 4_000),
     ("host-sim/evidence", 4_000),

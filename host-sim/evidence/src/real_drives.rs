@@ -114,7 +114,7 @@ pub struct Half {
     pub own: f64,
     /// Our driver on the other half.
     pub ours: f64,
-    /// The same without a delay, which is the two-point driver with a bias (Salvucci and Gray 2004), on the other half.
+    /// That value without a delay, which is the two-point driver with a bias (Salvucci and Gray 2004), on the other half.
     pub two_point: f64,
     /// The linear regression on the other half.
     pub linear: f64,

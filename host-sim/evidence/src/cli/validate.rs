@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     /// if in the first two worlds those of a quantity surely hold it in fewer than 90 % (20 drives or more tell)
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["participant", "probe"])]
     vehicles: Option<u32>,
-    /// Of --corruptions and --changes: only those whose name holds this
+    /// Only those of --corruptions and --changes whose name holds this
     #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings"])]
     only: String,
     #[command(flatten)]

@@ -20,7 +20,7 @@ pub(crate) struct Balance {
     /// Without a fault.
     #[serde(flatten)]
     pub(crate) availability: Availability,
-    /// With every fault by name.
+    /// The results with every fault by name.
     pub(crate) detection: Option<Detection>,
 }
 

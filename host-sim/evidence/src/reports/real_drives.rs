@@ -262,7 +262,7 @@ fn sources(found: &RealDrives) -> Table {
 mod tests {
     use super::*;
 
-    /// Of 20 drives the sign test takes the 6th from either end (Conover, table A3: P(X <= 5) = 0.0207); of 6 the first, of 5 none.
+    /// The sign test takes of 20 drives the 6th from either end (Conover, table A3: P(X <= 5) = 0.0207); of 6 the first, of 5 none.
     #[test]
     fn the_interval_of_a_median_has_the_ranks_of_the_sign_test() {
         let drives = |n: u32| (0..n).flat_map(|k| [f64::from(k); 2]).collect::<Vec<_>>();
