@@ -7,7 +7,7 @@
 //! | read or write a log | [`haptic_log::formats`] |
 //! | find a driver's parameters in a log | [`haptic_analysis::identify`] |
 //! | run many drives, or one of the studies | [`haptic_batch`] |
-//! | inject faults and judge what follows | [`haptic_campaign`] |
+//! | inject faults and judge what follows | `haptic_campaign`, `haptic_evidence` |
 //! | compare with QEMU or a board | [`haptic_pil`] |
 //! | draw a result | [`haptic_report`] |
 //! | read what decides the torque | [`haptic_core`] |

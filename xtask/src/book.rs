@@ -273,7 +273,7 @@ mod tests {
             }
         }
         asked.sort();
-        assert_eq!(asked, [REQUIREMENTS, FAULTS]);
+        assert_eq!(asked, [FAULTS, REQUIREMENTS]);
     }
 
     #[test]
