@@ -31,7 +31,7 @@ const fn metric(name: &'static str, label: &'static str, unit: &'static str) -> 
     }
 }
 
-/// Every figure, in the order of [`measured`]. What has an entry in the list of metrics is that metric.
+/// Every figure, in the order of `measured`. What has an entry in the list of metrics is that metric.
 pub const METRICS: [Metric; 11] = [
     metric("peak_lateral_error_m", "Peak lateral error", "m"),
     metric("mean_abs_lateral_error_m", "Mean lateral error", "m"),
