@@ -15,10 +15,10 @@ pub(crate) const CERTAIN: f64 = 5.0;
 pub(crate) const BALANCE_SEEN: f64 = 0.8;
 /// Differences of scale and of delay, s, that are too small to matter.
 const SMALL_SCALE: f64 = 0.1;
-/// The same beside dry friction: with 0.5 N.m of it that gives way over 0.2 degrees, right logs come out at 0.82 to 0.87.
+/// How far a scale may be off beside dry friction: with 0.5 N.m of it that gives way over 0.2 degrees, right logs come out at 0.82 to 0.87.
 const SMALL_SCALE_BESIDE_FRICTION: f64 = 0.3;
 const SMALL_DELAY_S: f64 = 0.0045;
-/// The same of T_d against the wheel angle, which moves t_p alone: less is not told from the column's own lags.
+/// How late T_d may be against the wheel angle, which moves t_p alone: less is not told from the column's own lags.
 const SMALL_DRIVER_DELAY_S: f64 = 0.015;
 /// Largest autocorrelation of residuals, beyond that of resampling, that leaves the noise model standing: more is another
 /// noise.

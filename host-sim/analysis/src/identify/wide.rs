@@ -7,7 +7,7 @@ use multiversion::multiversion;
 
 /// Partial sums: enough to keep an adder busy that takes four cycles.
 const PARTS: usize = 16;
-/// The same where several sums are formed at once.
+/// Partial sums where several sums are formed at once.
 const FEW: usize = 8;
 
 /// Rows that are read at once.

@@ -60,7 +60,7 @@ pub enum Part {
 /// How wide half of a 95 % interval may be.
 #[derive(Debug, Clone, Copy)]
 enum Width {
-    /// As a share of a value above zero, whose logarithm is normal.
+    /// A part of a value above zero, whose logarithm is normal.
     Share(f64),
     /// In the quantity's unit.
     Plain(f64),

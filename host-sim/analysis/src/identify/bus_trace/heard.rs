@@ -46,7 +46,7 @@ pub(super) struct Heard<'a> {
 }
 
 impl<'a> Heard<'a> {
-    /// Of these signals, which a DBC file has to know.
+    /// Hears these signals, which a DBC file has to know.
     pub(super) fn of(names: &[&'static str], dbc: &'a Dbc) -> Result<Self, LogError> {
         let mut heard = Self {
             carriers: Vec::new(),

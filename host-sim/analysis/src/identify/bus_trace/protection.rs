@@ -27,7 +27,7 @@ pub(super) struct Auditor {
 }
 
 impl Auditor {
-    /// Of the frames of a message.
+    /// Checks the frames of a message.
     pub(super) fn of(dbc: &Dbc, message: &Message) -> Self {
         Self {
             name: message.name.clone(),

@@ -30,7 +30,7 @@ use crate::identify::verdict;
 /// How much a change has to add to twice the log likelihood to be declared. At most two in a hundred constant drivers
 /// are then declared changed.
 const LEVEL: f64 = 16.0;
-/// The same for a change that goes back: it has a length besides, and more of them are tried.
+/// The level of a change that goes back: it has a length besides, and more of them are tried.
 const BLIP_LEVEL: f64 = 21.0;
 /// Above this value a change is not declared yet, but widens the errors of the estimates.
 const DOUBT: f64 = 10.0;
