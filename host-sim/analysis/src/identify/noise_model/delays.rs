@@ -29,7 +29,7 @@ pub(super) struct Delays<'a> {
     point: Vec<f64>,
     /// What is seen, and the driver's line in bends, through the filter, over the whole record; and before it.
     seen: [[Lagged; 2]; 4],
-    /// Of the rows of the loss: T_h through the arm, the driver's offset, and the torque without all that is seen.
+    /// What does not depend on the delay, in the rows of the loss: T_h through the arm, the driver's offset; and T_d less all that is seen.
     fixed: [Vec<f64>; 2],
     rest: Vec<f64>,
 }
@@ -39,7 +39,7 @@ const SEEN: [usize; 4] = [0, 1, 2, OWN_BEND];
 const FIXED: [usize; 2] = [K_HG, OWN_OFFSET];
 
 impl<'a> Delays<'a> {
-    /// With all at `point` but the delay.
+    /// Holds all at `point` but the delay.
     pub(super) fn new(problem: &'a Problem<'a>, point: &[f64], line: Line) -> Self {
         let (p, s) = (point, &problem.signals);
         let mix = |parts: &[(f64, &Lagged)], ramp: f64| {

@@ -408,7 +408,7 @@ impl<'a> Problem<'a> {
         quadratic
     }
 
-    /// The same with the derivatives by that: only for sums that have those of the record too.
+    /// [`Self::with_prior`] with the derivatives by what is held too, for sums that have those of the record.
     fn with_prior_by_muscle(&self, p: &[f64], quadratic: Quadratic) -> Quadratic {
         let loss = quadratic.loss;
         let mut quadratic = self.with_prior(p, quadratic);

@@ -23,7 +23,7 @@ impl Problem<'_> {
         self.with_prior(p, self.sums::<{ LINEAR + 1 }>(p))
     }
 
-    /// The same by all that is the driver's.
+    /// Loss, and its derivatives by all that is the driver's, at `p`; those by the others are left at zero.
     pub(super) fn driver_sums(&self, p: &[f64]) -> Quadratic {
         self.with_prior(p, self.sums::<{ DRIVER + 1 }>(p))
     }
@@ -38,7 +38,7 @@ impl Problem<'_> {
         self.with_prior_by_muscle(p, self.sums::<{ COUNT + 1 }>(p))
     }
 
-    /// Of the record alone, by the first `N - 1` parameters and the constants.
+    /// Loss and derivatives of the record alone, by the first `N - 1` parameters and the constants.
     fn sums<const N: usize>(&self, p: &[f64]) -> Quadratic {
         let size = self.size();
         let mut all = Quadratic {
