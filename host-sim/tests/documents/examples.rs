@@ -24,10 +24,11 @@ use super::{documents, place, root, run};
 use crate::{EVIDENCE, built, program};
 
 /// What a reader waits for and a test does not.
-const SHORTER: [(&str, &str); 3] = [
+const SHORTER: [(&str, &str); 4] = [
     ("--seeds 20", "--seeds 1"),
     ("-- experiment --probe", "-- experiment --participant 3 --probe"),
     ("xtask reliance", "xtask reliance --participant 3 --seeds 1"),
+    ("xtask handover", "xtask handover --every 5"),
 ];
 
 /// A fenced block: its first line without the backticks, and its text.
