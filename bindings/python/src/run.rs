@@ -2,7 +2,7 @@
 
 use haptic_analysis::metrics::{DEFINITIONS, Window};
 use haptic_batch::engine::Watch;
-use haptic_batch::reliance::Readings;
+use haptic_batch::readings::Readings;
 use haptic_core::bus::Frame;
 use haptic_log::trace::CHANNELS;
 use haptic_sim::simulation::Run;

@@ -60,7 +60,10 @@ impl From<&str> for StudyError {
 }
 
 /// Refuses what was asked for, in a sentence.
-pub(crate) fn refuse<T>(sentence: impl Into<String>) -> Result<T, StudyError> {
+///
+/// # Errors
+/// Always: [`StudyError::Asked`].
+pub fn refuse<T>(sentence: impl Into<String>) -> Result<T, StudyError> {
     Err(StudyError::Asked(sentence.into()))
 }
 

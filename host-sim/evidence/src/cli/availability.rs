@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use crate::reports::availability::{Balance, Detection, report, worlds};
 use clap::Args;
-use haptic_batch::availability::{AvailabilityPlan, DriveSegment, ROADS, resumed};
 use haptic_batch::engine;
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, campaign};
+use haptic_evidence::availability::{AvailabilityPlan, DriveSegment, ROADS, resumed};
 use haptic_sim::worlds::WORLDS;
 
 use host_sim::cli::checkpoint::Checkpoint;

@@ -18,7 +18,8 @@ use haptic_sim::models::sensors;
 use serde::Serialize;
 
 use super::rows::Rows;
-use haptic_batch::availability::{Listener, Rate, UNNAMED};
+use crate::declared::{Listener, UNNAMED};
+use haptic_batch::Rate;
 
 /// Rows further apart are a gap, in which nothing is sent, s.
 const GAP_S: f64 = 0.25;

@@ -1,7 +1,7 @@
 //! What is shown of how often guidance leaves for nothing: tables and figures.
 
-use haptic_batch::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_campaign::campaign::CaseResult;
+use haptic_evidence::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_report::studies::place;
@@ -270,7 +270,7 @@ fn figure(results: &Availability) -> Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptic_batch::availability::Lost;
+    use haptic_evidence::availability::Lost;
 
     fn cell(count: u64, hours: f64) -> Row {
         Row {

@@ -9,7 +9,7 @@ use crate::document::{
 };
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
-use haptic_batch::reliance::Reading;
+use haptic_batch::readings::Reading;
 use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::trace::Sample;
 use haptic_log::{Event, candump};

@@ -2,7 +2,7 @@ use haptic_sim::scenario::Speed;
 use haptic_sim::worlds::WORLDS;
 
 use super::*;
-use crate::engine::{Watch, on_threads, run};
+use haptic_batch::engine::{Watch, on_threads, run};
 
 /// Exact limits of a Poisson count as tables print them (Garwood 1936; Ulm 1990): 0 to 3.689, 0.0253 to 5.572, 4.795 to
 /// 18.39, 81.36 to 121.63; and three for the one-sided limit of none.
@@ -302,7 +302,7 @@ fn legs_are_the_same_side_by_side() {
                 .find(|number| segment.is(number))
                 .unwrap();
             // As the file has it, which tells 0 from -0.
-            let text = |segment: &DriveSegment| toml::to_string(segment).unwrap();
+            let text = |segment: &DriveSegment| serde_json::to_string(segment).unwrap();
             assert_eq!(text(segment), text(&number.drive(1).unwrap()), "{name}");
         }
     }

@@ -24,12 +24,12 @@ use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
 
 pub use crate::declared::{Declaration, Listener, Reported, UNNAMED};
-pub use crate::statistics::Rate;
+pub use haptic_batch::Rate;
 pub use roads::{ROADS, Road};
 pub use segment::{ByHand, DriveSegment, Ended, SegmentNumber};
 
-use crate::engine::{Part, Plan, Resumed, Store, Study};
-use crate::error::StudyError;
+use haptic_batch::StudyError;
+use haptic_batch::engine::{Part, Plan, Resumed, Store, Study};
 
 /// Length of a segment, s.
 pub const SEGMENT_S: f64 = 300.0;
