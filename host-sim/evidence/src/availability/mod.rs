@@ -9,7 +9,7 @@
 //! vehicle that leaves the road is no false declaration. So every segment is driven a second time without guidance, whatever
 //! the first time showed, and a segment that is *lost by hand* is counted apart, with its hours.
 //!
-//! Legs of one number and road share course, driver, car and noise in every world, so that worlds can be
+//! Segments of one number and road share course, driver, car and noise in every world, so that worlds can be
 //! compared. A segment depends on the seed and on its own number alone: in whatever order and in however many sittings segments
 //! are driven, the results are the same.
 //!
@@ -132,11 +132,11 @@ pub struct Cell {
     pub cars: usize,
     /// Cars that had a false declaration.
     pub cars_with: usize,
-    /// Legs that ended in a latched fault.
+    /// Segments that ended in a latched fault.
     pub latched: usize,
-    /// Legs in which the vehicle left the road, and by hand does not.
+    /// Segments in which the vehicle left the road, and by hand does not.
     pub diverged: usize,
-    /// Legs in which it leaves the road by hand too: nothing above counts them.
+    /// Segments in which it leaves the road by hand too: nothing above counts them.
     pub lost_by_hand: Lost,
     /// Standard deviation of the lateral position (SDLP), m: mean over the segments.
     pub sdlp_m: f64,
@@ -144,11 +144,10 @@ pub struct Cell {
     pub largest_error_m: f64,
 }
 
-/// Legs that say nothing of guidance.
+/// Segments that say nothing of guidance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lost {
     /// How many.
-    #[serde(rename = "legs")]
     pub segments: usize,
     /// How long they were driven with guidance at hand, h.
     pub hours: f64,
@@ -176,8 +175,7 @@ pub struct Availability {
     pub cells: Vec<Cell>,
     /// Judged worlds, their roads together, if there are several.
     pub together: Vec<Cell>,
-    /// Legs of judged worlds in which the ECU left, or the vehicle left the road, with guidance or by hand.
-    #[serde(rename = "legs")]
+    /// Segments of judged worlds in which the ECU left, or the vehicle left the road, with guidance or by hand.
     pub segments: Vec<DriveSegment>,
 }
 
