@@ -1,7 +1,7 @@
 //! How often guidance leaves for nothing, in small: nothing on paper, and nothing where cameras blink.
 
 use haptic_batch::engine::{Study, Watch};
-use haptic_evidence::availability::{AvailabilityPlan, ROADS};
+use haptic_evidence::availability::{AvailabilityPlan, Confidence, ROADS};
 use haptic_sim::worlds::WORLDS;
 
 fn drive(world: &str, hours: f64) -> haptic_evidence::availability::Availability {
@@ -11,6 +11,7 @@ fn drive(world: &str, hours: f64) -> haptic_evidence::availability::Availability
         hours,
         seed: 1,
         only: Vec::new(),
+        level: Confidence::USUAL,
     };
     plan.run(&Watch::nobody()).unwrap()
 }

@@ -27,10 +27,11 @@ pub struct ResultArguments {
 
 /// How sure intervals are.
 #[derive(Debug, Args)]
-pub(super) struct LevelArgument {
+pub struct LevelArgument {
     /// How often intervals hold what they are of: 0.5 to 0.9999
     #[arg(long, value_name = "SHARE", default_value = "0.95")]
-    pub(super) level: Confidence,
+    /// What was given, or 95 %.
+    pub level: Confidence,
 }
 
 /// A study's file, and how it is driven.

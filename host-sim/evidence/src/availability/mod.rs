@@ -24,7 +24,7 @@ use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
 
 pub use crate::declared::{Declaration, Listener, Reported, UNNAMED};
-pub use haptic_batch::Rate;
+pub use haptic_batch::{Confidence, Rate};
 pub use roads::{ROADS, Road};
 pub use segment::{ByHand, DriveSegment, Ended, SegmentNumber};
 
@@ -49,6 +49,8 @@ pub struct AvailabilityPlan {
     pub seed: u64,
     /// These segments in place of hours of them; none: the hours.
     pub only: Vec<u32>,
+    /// How often intervals hold the rate that they are of.
+    pub level: Confidence,
 }
 
 impl AvailabilityPlan {
@@ -171,6 +173,9 @@ pub struct Availability {
     pub seed: u64,
     /// Hours asked for in each world on each road.
     pub hours: f64,
+    /// How often intervals hold the rate that they are of.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
     /// By world and road.
     pub cells: Vec<Cell>,
     /// Judged worlds, their roads together, if there are several.
@@ -205,7 +210,7 @@ fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability 
     let of_cell = &of_cell;
     let cells = plan.worlds.iter().flat_map(|world| {
         let roads = plan.roads.iter();
-        roads.map(move |road| cell(world, road.name, &of_cell(world, road)))
+        roads.map(move |road| cell(world, road.name, &of_cell(world, road), plan.level))
     });
     let cells = cells.collect();
     let several = plan
@@ -214,7 +219,7 @@ fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability 
         .filter(|world| world.judged && plan.roads.len() > 1);
     let together = several.map(|world| {
         let on_all: Vec<&DriveSegment> = plan.roads.iter().flat_map(|road| of_cell(world, road)).collect();
-        cell(world, "all", &on_all)
+        cell(world, "all", &on_all, plan.level)
     });
     let together = together.collect();
     let numbers = plan.segments();
@@ -226,13 +231,14 @@ fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability 
     Availability {
         seed: plan.seed,
         hours: plan.hours,
+        level: plan.level,
         cells,
         together,
         segments: happened.collect(),
     }
 }
 
-fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment]) -> Cell {
+fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment], level: Confidence) -> Cell {
     let (lost, segments): (Vec<&DriveSegment>, Vec<&DriveSegment>) = segments
         .iter()
         .copied()
@@ -251,7 +257,7 @@ fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment]) -> Ce
         .chunk_by(|a, b| a == b)
         .map(|same| Cause {
             faults: same[0].into(),
-            rate: Rate::new(same.len() as u64, hours),
+            rate: Rate::new(same.len() as u64, hours, level),
         })
         .collect();
     causes.sort_by_key(|cause| std::cmp::Reverse(cause.rate.count));
@@ -270,7 +276,7 @@ fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment]) -> Ce
         judged: world.judged,
         hours,
         available: sum(|segment| segment.active_s) / (3600.0 * hours),
-        declarations: Rate::new(declared().count() as u64, hours),
+        declarations: Rate::new(declared().count() as u64, hours, level),
         causes,
         cars: cars(false),
         cars_with: cars(true),
