@@ -60,7 +60,7 @@ const APART: [&str; 4] = ["controller", "law", "safety", "service"];
 #[rustfmt::skip]
 const STUDIES: Arrows = &[
     ("host-sim/batch/src", &["adaptation", "bus_load", "compare", "course", "design", "design_guidance", "evaluate", "experiment", "identify", "run", "stability", "study", "sweep"]),
-    ("host-sim/evidence/src", &["availability", "estimates", "handover", "real_drives", "reliance"]),
+    ("host-sim/evidence/src", &["availability", "estimates", "handover", "real_drives", "reliance", "vehicle"]),
 ];
 
 /// What only the engine of the studies uses: threads, and runs side by side.
@@ -82,20 +82,22 @@ const PACKAGES: Arrows = &[
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
     ("host-sim/vectorised", &["haptic-core", "haptic-log", "haptic-sim"]),
+    ("host-sim/metrics", &["haptic-log"]),
+    ("host-sim/vehicle", &["haptic-log"]),
     ("host-sim/analysis", &["haptic-log"]),
-    ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim", "haptic-vectorised"]),
+    ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("host-sim/pil", &["haptic-core", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
-    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-sim"]),
+    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
     // Beside these the command line's own parts, of host-sim.
-    ("host-sim/evidence", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-core", "haptic-log", "haptic-report", "haptic-sim", "haptic-vectorised"]),
+    ("host-sim/evidence", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-core", "haptic-log", "haptic-report", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("bindings/c", &["haptic-core"]),
     // Driver and vehicle are the simulator's.
     ("bindings/fmu", &["haptic-core", "haptic-sim"]),
     // The loop and the identification in a page.
-    ("bindings/web", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
+    ("bindings/web", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim"]),
     // The parts that Python hands out; no injector, no serial port, no charts.
-    ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-sim"]),
+    ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim"]),
 ];
 
 /// What the simulator may not touch: it runs in a browser and in somebody else's process.

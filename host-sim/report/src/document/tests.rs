@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::plot::{Axis, Panel, Series};
-use haptic_analysis::metrics::{DEFINITIONS, Metrics};
+use haptic_metrics::{DEFINITIONS, Metrics};
 use std::fs;
 use std::io;
 
