@@ -19,7 +19,7 @@ pub(crate) const BUDGETS: [(&str, usize); 23] = [
     ("examples", 200),
     ("firmware", 2_700),
     ("firmware/lockstep", 200),
-    ("host-sim", 2_700),
+    ("host-sim", 2_750),
     ("host-sim/analysis", 9_200),
     ("host-sim/batch", 8_800),
     ("host-sim/campaign", 4_000),
