@@ -1,16 +1,17 @@
 //! How often guidance leaves for nothing, in small: nothing on paper, and nothing where cameras blink.
 
-use haptic_batch::availability::{AvailabilityPlan, ROADS};
 use haptic_batch::engine::{Study, Watch};
+use haptic_evidence::availability::{AvailabilityPlan, Confidence, ROADS};
 use haptic_sim::worlds::WORLDS;
 
-fn drive(world: &str, hours: f64) -> haptic_batch::availability::Availability {
+fn drive(world: &str, hours: f64) -> haptic_evidence::availability::Availability {
     let plan = AvailabilityPlan {
         worlds: WORLDS.iter().filter(|kind| kind.name == world).collect(),
         roads: ROADS.iter().collect(),
         hours,
         seed: 1,
         only: Vec::new(),
+        level: Confidence::USUAL,
     };
     plan.run(&Watch::nobody()).unwrap()
 }

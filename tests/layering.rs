@@ -55,32 +55,23 @@ const CORE: Arrows = &[
 /// Rooms of core whose modules stand by themselves, and have arrows of their own.
 const APART: [&str; 4] = ["controller", "law", "safety", "service"];
 
-/// The studies of batch, each a module with what is its own. What two of them need belongs to the engine, to the statistics or to
+/// The studies of a crate, each a module with what is its own. What two of them need belongs to the engine, to the statistics or to
 /// another module that is none of these.
-const STUDIES: &[&str] = &[
-    "adaptation",
-    "availability",
-    "bus_load",
-    "course",
-    "compare",
-    "design",
-    "design_guidance",
-    "evaluate",
-    "experiment",
-    "handover",
-    "identify",
-    "reliance",
-    "run",
-    "stability",
-    "study",
-    "sweep",
+#[rustfmt::skip]
+const STUDIES: Arrows = &[
+    ("host-sim/batch/src", &["adaptation", "bus_load", "compare", "course", "design", "design_guidance", "evaluate", "experiment", "identify", "run", "stability", "study", "sweep"]),
+    ("host-sim/evidence/src", &["availability", "estimates", "handover", "real_drives", "reliance", "vehicle"]),
 ];
 
 /// What only the engine of the studies uses: threads, and runs side by side.
 const ENGINES_OWN: [&str; 2] = ["rayon", "haptic_vectorised"];
 /// Files with runs of two kinds for a case (with the failure and without, with guidance and by hand), which ask the engine's groups for
 /// them; and a step of a run that is recorded.
-const SIDE_BY_SIDE: [&str; 3] = ["availability/drive.rs", "recorder.rs", "sweep/vectorised.rs"];
+const SIDE_BY_SIDE: [&str; 3] = [
+    "evidence/src/availability/drive.rs",
+    "batch/src/recorder.rs",
+    "batch/src/sweep/vectorised.rs",
+];
 
 /// Which of our packages each package of the workspace may depend on, without its tests.
 #[rustfmt::skip]
@@ -91,20 +82,22 @@ const PACKAGES: Arrows = &[
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
     ("host-sim/vectorised", &["haptic-core", "haptic-log", "haptic-sim"]),
+    ("host-sim/metrics", &["haptic-log"]),
+    ("host-sim/vehicle", &["haptic-log"]),
     ("host-sim/analysis", &["haptic-log"]),
-    ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim", "haptic-vectorised"]),
+    ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("host-sim/pil", &["haptic-core", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
-    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-sim"]),
+    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
     // Beside these the command line's own parts, of host-sim.
-    ("host-sim/evidence", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-core", "haptic-log", "haptic-report", "haptic-sim"]),
+    ("host-sim/evidence", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-core", "haptic-log", "haptic-report", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("bindings/c", &["haptic-core"]),
     // Driver and vehicle are the simulator's.
     ("bindings/fmu", &["haptic-core", "haptic-sim"]),
     // The loop and the identification in a page.
-    ("bindings/web", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
+    ("bindings/web", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim"]),
     // The parts that Python hands out; no injector, no serial port, no charts.
-    ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-sim"]),
+    ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim"]),
 ];
 
 /// What the simulator may not touch: it runs in a browser and in somebody else's process.
@@ -291,25 +284,28 @@ fn the_core_has_the_arrows_of_its_table_and_no_others() {
 
 #[test]
 fn no_study_is_used_by_another_module() {
-    let mut used = arrows("host-sim/batch/src");
-    for study in STUDIES {
-        assert!(
-            used.contains_key(*study) || ["bus_load", "course"].contains(study),
-            "there is no {study}"
-        );
+    for (src, studies) in STUDIES {
+        let there = |study: &&str| {
+            root().join(src).join(study).is_dir() || root().join(src).join(format!("{study}.rs")).exists()
+        };
+        assert!(studies.iter().all(there), "{src} has not all of {studies:?}");
+        let mut used = arrows(src);
+        // What a program shows belongs to the program.
+        used.retain(|from, _| !["cli", "reports"].contains(&from.as_str()));
+        for to in used.values_mut() {
+            to.retain(|to| studies.contains(&to.as_str()));
+        }
+        used.retain(|_, to| !to.is_empty());
+        assert_eq!(used, BTreeMap::new());
     }
-    for to in used.values_mut() {
-        to.retain(|to| STUDIES.contains(&to.as_str()));
-    }
-    used.retain(|_, to| !to.is_empty());
-    assert_eq!(used, BTreeMap::new());
 }
 
 #[test]
 fn only_the_engine_of_the_studies_has_threads_and_runs_side_by_side() {
-    let src = root().join("host-sim/batch/src");
-    for path in sources(&src) {
-        let below = path.strip_prefix(&src).unwrap();
+    let host_sim = root().join("host-sim");
+    let both = STUDIES.iter().flat_map(|(src, _)| sources(&root().join(src)));
+    for path in both {
+        let below = path.strip_prefix(&host_sim).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         let (product, _) = text
             .split_once("#[cfg(test)]\nmod tests {")
@@ -317,7 +313,7 @@ fn only_the_engine_of_the_studies_has_threads_and_runs_side_by_side() {
         let own = tokens(product);
         let uses = |name: &&&str| own.iter().any(|token| token == **name);
         let hits: Vec<_> = ENGINES_OWN.iter().filter(uses).collect();
-        let may = below.starts_with("engine") || SIDE_BY_SIDE.contains(&below.to_str().unwrap());
+        let may = below.starts_with("batch/src/engine") || SIDE_BY_SIDE.contains(&below.to_str().unwrap());
         assert!(may || hits.is_empty(), "{} uses {hits:?}", path.display());
     }
 }

@@ -2,7 +2,7 @@
 //! envelope clips the probe is `unclipped`'s question.)
 
 use haptic_batch::engine::Watch;
-use haptic_batch::reliance::{Readings, ReliancePlan, study};
+use haptic_evidence::reliance::{Readings, ReliancePlan, study};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::scenario::{GuidanceParameters, Scenario};

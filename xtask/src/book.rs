@@ -23,6 +23,7 @@ const PRINTED: [&str; 2] = ["<!-- printed: ", " -->"];
 /// The commands that print a table for the book.
 const REQUIREMENTS: &str = "cargo xtask trace --page";
 const FAULTS: &str = "cargo xtask faults --list";
+const NAMED: &str = "host-sim compare --list ";
 
 /// Makes the book in `target/book/html`; an error names links that lead nowhere.
 pub(crate) fn build() -> Result<()> {
@@ -102,6 +103,13 @@ fn with_printed(text: &str) -> Result<String> {
                 let program = Built::Daily.evidence()?;
                 made.push_str(&output(
                     command(&program.to_string_lossy()).args(["faults", "--list"]),
+                )?);
+            }
+            Some(listed) if listed.starts_with(NAMED) => {
+                let program = Built::Daily.host_sim()?;
+                let what = &listed[NAMED.len()..];
+                made.push_str(&output(
+                    command(&program.to_string_lossy()).args(["compare", "--list", what]),
                 )?);
             }
             Some(other) => bail!("{other}: not a command that prints a table for the book"),

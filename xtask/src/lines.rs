@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 21] = [
+pub(crate) const BUDGETS: [(&str, usize); 23] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -19,16 +19,18 @@ pub(crate) const BUDGETS: [(&str, usize); 21] = [
     ("examples", 200),
     ("firmware", 2_700),
     ("firmware/lockstep", 200),
-    ("host-sim", 2_700),
-    ("host-sim/analysis", 11_400),
-    ("host-sim/batch", 10_600),
+    ("host-sim", 2_750),
+    ("host-sim/analysis", 9_200),
+    ("host-sim/batch", 8_800),
     ("host-sim/campaign", 4_000),
-    ("host-sim/evidence", 4_000),
+    ("host-sim/evidence", 5_900),
     ("host-sim/log", 5_400),
+    ("host-sim/metrics", 600),
     ("host-sim/pil", 1_900),
     ("host-sim/report", 5_500),
     ("host-sim/sim", 8_800),
     ("host-sim/vectorised", 2_800),
+    ("host-sim/vehicle", 1_700),
     ("xtask", 6_500),
     ("xtask/log", 100),
 ];

@@ -1,10 +1,10 @@
 //! Whole runs and the paper's evaluation.
 
-use haptic_analysis::metrics::{DEFINITIONS, Window};
 use haptic_batch::engine::Watch;
-use haptic_batch::reliance::Readings;
+use haptic_batch::readings::Readings;
 use haptic_core::bus::Frame;
 use haptic_log::trace::CHANNELS;
+use haptic_metrics::{DEFINITIONS, Window};
 use haptic_sim::simulation::Run;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;

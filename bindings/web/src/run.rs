@@ -1,10 +1,10 @@
 //! A run under way: its loop, its record, and what the page asks of them.
 
-use haptic_analysis::metrics::{self, Circumstances, Metrics, Window, measure};
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
 use haptic_core::controller::config::arm_share;
 use haptic_log::trace::{CHANNELS, Sample, Trace};
+use haptic_metrics::{self as metrics, Circumstances, Metrics, Window, measure};
 use haptic_sim::guidance::{AnyGuidance, Guidance, OwnLaw};
 use haptic_sim::input::InputError;
 use haptic_sim::kind::Make;

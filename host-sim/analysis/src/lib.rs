@@ -1,10 +1,8 @@
-//! What a recorded drive tells: how well it went, and who drove.
+//! What a recorded drive tells of who drove.
 //!
-//! - [`metrics`]: lane keeping, steering, effort, conflict, recovery; each with definition, unit and source.
-//! - [`identify`]: from a record to the parameters of the driver, with their uncertainty. K_hg is how strongly the
-//!   driver resists the guidance, t_p the delay from seeing to acting, `gain_i` what the torque can tell of vision. An
-//!   estimate that the data do not carry is no number but a verdict: not identified.
-//! - [`vehicle`]: from a record to the parameters of the vehicle and its steering column, with the same kind of verdicts.
+//! [`identify`] leads from a record to the parameters of the driver, with their uncertainty. K_hg is how strongly the
+//! driver resists the guidance, t_p the delay from seeing to acting, `gain_i` what the torque can tell of vision. An
+//! estimate that the data do not carry is no number but a verdict: not identified.
 //!
 //! ```
 //! use haptic_analysis::identify::{DriveLog, Options, identify_with_noise_model};
@@ -20,8 +18,7 @@
 //! # Ok::<(), haptic_analysis::identify::LogError>(())
 //! ```
 //!
-//! It works on records alone. Not here: driving (`haptic-sim`), sets of drives (`haptic-batch`).
+//! It works on records alone. Not here: driving (`haptic-sim`), sets of drives (`haptic-batch`), how well a drive
+//! went (`haptic-metrics`), its vehicle (`haptic-vehicle`).
 
 pub mod identify;
-pub mod metrics;
-pub mod vehicle;

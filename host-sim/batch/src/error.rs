@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use haptic_analysis::identify::{FixError, LogError};
-use haptic_analysis::vehicle::{ColumnsError, VehicleError};
 use haptic_sim::input::{InputError, RangeError};
 use haptic_sim::models::road::CourseError;
 use haptic_sim::scenario::ScenarioError;
+use haptic_vehicle::{ColumnsError, VehicleError};
 
 /// Why a study has no result. The text names the field with its value and its range, or the file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -60,7 +60,10 @@ impl From<&str> for StudyError {
 }
 
 /// Refuses what was asked for, in a sentence.
-pub(crate) fn refuse<T>(sentence: impl Into<String>) -> Result<T, StudyError> {
+///
+/// # Errors
+/// Always: [`StudyError::Asked`].
+pub fn refuse<T>(sentence: impl Into<String>) -> Result<T, StudyError> {
     Err(StudyError::Asked(sentence.into()))
 }
 

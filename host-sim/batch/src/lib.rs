@@ -7,7 +7,6 @@
 //! - [`evaluate`]: section 5 of the paper, three drivers under four conditions, with and without failure.
 //! - [`claims`]: what that evaluation must show.
 //! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
-//! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`vehicle`]: the vehicle of a recorded drive.
 //! - [`run`]: one scenario.
@@ -18,9 +17,7 @@
 //! - [`adaptation`]: a law that adapts to a driver who adapts to it.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
-//! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
 //! - [`stability`]: who keeps the lane at which speed and with which delay.
-//! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //!
 //! ```
 //! use haptic_sim::Scenario;
@@ -38,12 +35,10 @@
 //! Not here: options and exit codes (the command line), how a metric is computed, which files are left and how they look.
 
 pub mod adaptation;
-pub mod availability;
 mod away;
 pub mod bus_load;
 pub mod compare;
 pub mod course;
-mod declared;
 pub mod design;
 pub mod design_guidance;
 mod drivers;
@@ -52,16 +47,14 @@ mod error;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;
-pub mod handover;
 pub mod identify;
 mod metrics;
 pub mod paper;
 mod parts;
 mod places;
-mod readings;
+pub mod readings;
 mod record;
 mod recorder;
-pub mod reliance;
 pub mod run;
 mod sobol;
 pub mod statistics;
@@ -74,7 +67,7 @@ pub mod vehicle;
 
 pub use away::{Away, left_by_themselves};
 pub use engine::shares;
-pub use error::StudyError;
+pub use error::{StudyError, refuse};
 pub use evaluate::claims;
 pub use record::{RunRecord, check_window, peak_m};
 pub use statistics::{Confidence, Mean, Rate};

@@ -1,7 +1,7 @@
 //! The figures that laws are compared by: of a drive, and of what comes behind its failures.
 
-use haptic_analysis::metrics::{Circumstances, Metrics, measure};
 use haptic_log::trace::Trace;
+use haptic_metrics::{Circumstances, Metrics, measure};
 use haptic_sim::scenario::{FailureKind, Scenario};
 use haptic_sim::simulation::DIVERGED_M;
 use serde::Serialize;

@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::Away;
 use crate::error::{StudyError, refuse};
-use haptic_analysis::metrics::{self, Circumstances, Metrics, Window};
 use haptic_core::controller::params::Params;
 use haptic_log::trace::Sample;
+use haptic_metrics::{self as metrics, Circumstances, Metrics, Window};
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};

@@ -73,6 +73,11 @@ impl Confidence {
         0.5 + 0.5 * self.0
     }
 
+    /// What is left out at the lower end: 0.025 of 95 %, and no 0.02500000000000002.
+    fn lower(self) -> f64 {
+        (1e12 * (1.0 - self.upper())).round() / 1e12
+    }
+
     /// How many standard deviations an interval of a normal distribution reaches.
     pub(crate) fn normal(self) -> f64 {
         // The digits of tables, to the last bit as the campaign has them.
@@ -95,7 +100,8 @@ impl Confidence {
 
     /// Whether it is 95 %, of which JSON says nothing more.
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
-    pub(crate) fn is_usual(&self) -> bool {
+    #[must_use]
+    pub fn is_usual(&self) -> bool {
         *self == Self::USUAL
     }
 }
@@ -174,21 +180,23 @@ pub(crate) fn wilson(share: f64, count: f64, level: Confidence) -> [f64; 2] {
 }
 
 /// Counts in a time, and what they say of the rate behind them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rate {
     /// Events.
     pub count: u64,
     /// Events in an hour.
     pub per_hour: f64,
-    /// The exact 95 % interval of the rate (Garwood 1936), 1/h.
+    /// The exact interval of the rate (Garwood 1936), 1/h.
     pub interval: [f64; 2],
-    /// The rate that is not exceeded with 95 % confidence, 1/h: for zero events three in the time.
-    pub upper_95: f64,
+    /// The rate that is not exceeded with the confidence of the level, 1/h: at 95 % and for zero events three in the time.
+    pub upper: f64,
+    /// How often interval and bound hold the rate.
+    pub level: Confidence,
 }
 
 impl Rate {
     /// The rate behind so many events of a Poisson process in so many hours.
-    pub fn new(count: u64, hours: f64) -> Self {
+    pub fn new(count: u64, hours: f64, level: Confidence) -> Self {
         let quantile = |share: f64, degrees: u64| {
             let law = ChiSquared::new(degrees as f64).expect("positive");
             0.5 * quantile(&law, share)
@@ -196,16 +204,29 @@ impl Rate {
         let low = if count == 0 {
             0.0
         } else {
-            quantile(0.025, 2 * count)
+            quantile(level.lower(), 2 * count)
         };
         // In no time nothing is known.
         let per = |events: f64| if hours > 0.0 { events / hours } else { f64::NAN };
         Self {
             count,
             per_hour: per(count as f64),
-            interval: [per(low), per(quantile(0.975, 2 * count + 2))],
-            upper_95: per(quantile(0.95, 2 * count + 2)),
+            interval: [per(low), per(quantile(level.upper(), 2 * count + 2))],
+            upper: per(quantile(level.share(), 2 * count + 2)),
+            level,
         }
+    }
+}
+
+/// Four fields, whose last has the level in its name: `upper_95`.
+impl Serialize for Rate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_map(Some(4))?;
+        fields.serialize_entry("count", &self.count)?;
+        fields.serialize_entry("per_hour", &self.per_hour)?;
+        fields.serialize_entry("interval", &self.interval)?;
+        fields.serialize_entry(&format!("upper_{}", self.level), &self.upper)?;
+        fields.end()
     }
 }
 

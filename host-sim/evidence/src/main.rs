@@ -2,7 +2,7 @@
 //! known. `cargo xtask` starts this program; the first command of the workbench does not compile it.
 //!
 //! A file below `cli` is a command, a file below `reports` what it shows. Not here: the campaign itself
-//! (`haptic-campaign`), the drives (`haptic-batch`), and the figures that documents keep (`cargo xtask evidence`).
+//! (`haptic-campaign`), the engine that drives (`haptic-batch`), and the figures that documents keep (`cargo xtask evidence`).
 
 mod cli;
 mod reports;

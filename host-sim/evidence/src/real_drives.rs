@@ -17,8 +17,8 @@ use std::path::Path;
 use haptic_analysis::identify::{
     DriveLog, Identification, Layout, Options, Parameter, Recording, identify_with_noise_model, open_mapped,
 };
-use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, each};
+use haptic_batch::{StudyError, refuse};
 use haptic_log::formats::{self, Format, Reading};
 use serde::Serialize;
 
@@ -35,11 +35,6 @@ use rows::Rows;
 const SHIFTS: usize = 99;
 /// Fewest rows of a half that is judged: 4 s at 10 Hz.
 const LEAST_ROWS: usize = 40;
-
-/// Refuses what was asked for, in a sentence.
-fn refuse<T>(sentence: impl Into<String>) -> Result<T, StudyError> {
-    Err(StudyError::Asked(sentence.into()))
-}
 
 /// All recordings below a directory.
 #[derive(Debug, Clone, Serialize)]

@@ -1,17 +1,31 @@
 //! `host-sim adaptation FILE.toml`.
 
+use std::path::PathBuf;
+
+use clap::Args;
 use haptic_batch::adaptation::Adaptation;
 use haptic_batch::compare::Kinds;
 use haptic_report::document::write_bytes;
 use haptic_report::studies::adaptation::report;
 
-use super::results::StudyFile;
+use super::progress::Threads;
+use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, progress};
 
-/// Help of the file.
-pub(super) const FILE: &str = "Study file (TOML): laws, drivers whose K_hg follows trust, a road, a loss (docs/explanation/two-adaptations.md)";
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Study file (TOML): laws, drivers whose K_hg follows trust, a road, a loss (docs/explanation/two-adaptations.md)
+    #[arg(value_name = "FILE.toml")]
+    file: PathBuf,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    level: LevelArgument,
+    #[command(flatten)]
+    results: ResultArguments,
+}
 
-pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
     let mut study = Adaptation::load(&arguments.file, &kinds)?;
     study.level = arguments.level.level;

@@ -1,9 +1,9 @@
 //! `host-sim evaluate`, which `host-sim` alone is too.
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::metrics::Window;
 use haptic_batch::check_window;
 use haptic_batch::evaluate::evaluate;
+use haptic_metrics::Window;
 use haptic_report::studies::evaluation::{report, write_series};
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;

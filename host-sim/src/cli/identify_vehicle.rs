@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_analysis::identify::Options;
-use haptic_analysis::vehicle::Known;
 use haptic_batch::vehicle::{identify, scenario_file};
 use haptic_log::formats::Contents;
 use haptic_report::document::write_bytes;
 use haptic_report::studies::vehicle::report;
+use haptic_vehicle::Known;
 
 use super::recording::ReadingArguments;
 use super::results::ResultArguments;

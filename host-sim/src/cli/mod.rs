@@ -89,8 +89,7 @@ enum Command {
     /// Every law against every driver, each law tuned first
     ///
     /// On roads, at speeds, with seeds and failures.
-    #[command(mut_arg("file", |file| file.help(compare::FILE)))]
-    Compare(results::StudyFile),
+    Compare(compare::Arguments),
     /// Gains of the guidance for a population of drivers
     ///
     /// They are judged on held-out drives.
@@ -98,8 +97,7 @@ enum Command {
     /// A law that adapts to a driver who adapts to it
     ///
     /// Small gain, equilibria, swings.
-    #[command(mut_arg("file", |file| file.help(adaptation::FILE)))]
-    Adaptation(results::StudyFile),
+    Adaptation(adaptation::Arguments),
     /// A road from a file: its lane, length, picture and centre
     Course(course::Arguments),
     /// A map over speed and delay: where a driver keeps the lane

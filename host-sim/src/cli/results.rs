@@ -8,7 +8,6 @@ use haptic_report::document::{Report, write_json};
 use serde::Serialize;
 
 use super::output::Output;
-use super::progress::Threads;
 use super::{BadInput, Outcome, print, print_json, print_notes, width};
 
 /// Help of `--out` where a study always leaves files.
@@ -27,23 +26,11 @@ pub struct ResultArguments {
 
 /// How sure intervals are.
 #[derive(Debug, Args)]
-pub(super) struct LevelArgument {
+pub struct LevelArgument {
     /// How often intervals hold what they are of: 0.5 to 0.9999
     #[arg(long, value_name = "SHARE", default_value = "0.95")]
-    pub(super) level: Confidence,
-}
-
-/// A study's file, and how it is driven.
-#[derive(Debug, Args)]
-pub(super) struct StudyFile {
-    #[arg(value_name = "FILE.toml")]
-    pub(super) file: PathBuf,
-    #[command(flatten)]
-    pub(super) threads: Threads,
-    #[command(flatten)]
-    pub(super) level: LevelArgument,
-    #[command(flatten)]
-    pub(super) results: ResultArguments,
+    /// What was given, or 95 %.
+    pub level: Confidence,
 }
 
 impl ResultArguments {

@@ -129,7 +129,7 @@ pub(super) struct Cause {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Lost {
-    pub(super) legs: u64,
+    pub(super) segments: u64,
 }
 
 impl Campaign {

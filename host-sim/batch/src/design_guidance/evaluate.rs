@@ -1,7 +1,7 @@
 //! A set of gains with every driver: lane error, effort, conflict, sudden losses, noise of the torque, stability.
 
-use haptic_analysis::metrics::zero_phase_low_pass;
 use haptic_core::controller::params::Params;
+use haptic_metrics::zero_phase_low_pass;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::participants::participants;
 use haptic_sim::scenario::{FailureKind, GuidanceParameters, Scenario, ScenarioError};

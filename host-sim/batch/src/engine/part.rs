@@ -68,7 +68,10 @@ impl<'a, C, R> Part<'a, C, R> {
     }
 
     /// Scenarios of the cases, in their order.
-    pub(crate) fn scenarios(
+    ///
+    /// # Errors
+    /// What `scenario` says.
+    pub fn scenarios(
         &self,
         scenario: impl Fn(&C) -> Result<Scenario, StudyError>,
     ) -> Result<Vec<Scenario>, StudyError> {
@@ -76,7 +79,7 @@ impl<'a, C, R> Part<'a, C, R> {
     }
 
     /// The scenarios as runs that go side by side.
-    pub(crate) fn group<'s>(&self, scenarios: &'s [Scenario]) -> Group<'s> {
+    pub fn group<'s>(&self, scenarios: &'s [Scenario]) -> Group<'s> {
         Group {
             scenarios,
             first: self.first,

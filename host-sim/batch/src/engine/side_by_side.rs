@@ -41,7 +41,7 @@ impl Checked {
 
 /// Runs that are driven in one thread: those of a study from a number on.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Group<'a> {
+pub struct Group<'a> {
     /// Each run's scenario.
     pub(crate) scenarios: &'a [Scenario],
     /// Number of the first of them in the study.
@@ -110,7 +110,7 @@ impl Group<'_> {
     ///
     /// # Errors
     /// As [`Self::run_batch`], with what `measure` says.
-    pub(crate) fn measured<T>(
+    pub fn measured<T>(
         &self,
         options: Options,
         alone: impl Fn(&Scenario) -> Run,

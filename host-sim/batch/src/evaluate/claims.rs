@@ -11,7 +11,7 @@ use super::EvaluationResults;
 pub use super::results::Claim;
 use crate::paper::DRIVERS_T_P;
 use crate::{Away, RunRecord, left_by_themselves};
-use haptic_analysis::metrics::{Metrics, Window};
+use haptic_metrics::{Metrics, Window};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 use haptic_sim::simulation::Run;

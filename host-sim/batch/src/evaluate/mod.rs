@@ -12,7 +12,7 @@ use crate::RunRecord;
 use crate::engine::{Watch, runs};
 use crate::error::StudyError;
 use crate::record::{check_window, default_window, failure_notes, nominal_peak_m};
-use haptic_analysis::metrics::Window;
+use haptic_metrics::Window;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, ScenarioError};
 use haptic_sim::simulation::Run;

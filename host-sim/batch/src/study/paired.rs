@@ -5,7 +5,7 @@
 //! *effect size* d_z is the mean divided by the standard deviation of the differences (Lakens 2013, Front. Psychol.
 //! 4:863).
 
-use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_metrics::{DEFINITIONS, Definition};
 use serde::Serialize;
 
 use super::SessionResult;

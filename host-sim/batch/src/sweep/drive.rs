@@ -1,6 +1,6 @@
 //! One drive of a sweep: its scenario driven and measured.
 
-use haptic_analysis::metrics::Window;
+use haptic_metrics::Window;
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;

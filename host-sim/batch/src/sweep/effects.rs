@@ -5,7 +5,7 @@
 //! interval, with the mean of its drives; where nothing is drawn, a repeat does. What a list compares meets the same samples,
 //! and its values are compared sample by sample.
 
-use haptic_analysis::metrics::Definition;
+use haptic_metrics::Definition;
 use serde::Serialize;
 
 use super::groups::{Drives, Group, Moments, share_between};

@@ -1,6 +1,6 @@
 //! The form of a sweep file, and what its fields mean. docs/sweeps.md lists them.
 
-use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_metrics::{DEFINITIONS, Definition};
 use haptic_sim::input::{InputError, parse_toml};
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};

@@ -47,7 +47,7 @@ pub use summary::{Distribution, Summary, Worst};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use haptic_analysis::metrics::{Definition, Window};
+use haptic_metrics::{Definition, Window};
 use haptic_sim::input::{InputError, in_range};
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::Scenario;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use haptic_analysis::metrics::Definition;
+use haptic_metrics::Definition;
 use haptic_sim::unguided::Cause;
 use serde::Serialize;
 

@@ -36,7 +36,7 @@ fn the_file_is_a_scenario_with_the_vehicle_that_was_found() {
     let best = found.best.as_mut().unwrap();
     best.k_t = 0.05;
     (best.k_f, best.k_r) = (60_000.0, 70_000.0);
-    let column = haptic_analysis::vehicle::BestColumn {
+    let column = haptic_vehicle::BestColumn {
         j_s: 0.09,
         b_s: 0.5,
         friction_nm: 0.0,

@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 
 use crate::reports::availability::{Balance, Detection, report, worlds};
 use clap::Args;
-use haptic_batch::availability::{AvailabilityPlan, DriveSegment, ROADS, resumed};
 use haptic_batch::engine;
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, campaign};
+use haptic_evidence::availability::{AvailabilityPlan, DriveSegment, ROADS, resumed};
 use haptic_sim::worlds::WORLDS;
 
 use host_sim::cli::checkpoint::Checkpoint;
 use host_sim::cli::output;
-use host_sim::cli::results::ResultArguments;
+use host_sim::cli::results::{LevelArgument, ResultArguments};
 use host_sim::cli::{BadInput, Outcome, chosen, print, progress, width};
 
 #[derive(Debug, Args)]
@@ -35,12 +35,14 @@ pub(crate) struct Arguments {
     /// Keep every drive in FILE as soon as it is done; a run with the same FILE goes on from there
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// Fail (exit code 1) if with 95 % confidence the rate of a judged world, its roads together, may be above R an hour
+    /// Fail (exit code 1) if with the confidence of --level the rate of a judged world, its roads together, may be above R an hour
     #[arg(long, value_name = "R")]
     max_rate: Option<f64>,
     /// Runs of each fault of the campaign in the world 'everything' (or the last one asked for); 0: none
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     fault_seeds: u64,
+    #[command(flatten)]
+    level: LevelArgument,
     #[command(flatten)]
     results: ResultArguments,
     /// Say what is real in each world, and drive nothing
@@ -78,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let too_many = |most: f64| {
         let judged = results.availability.judged();
-        let mut bounds = judged.map(|cell| cell.declarations.upper_95);
+        let mut bounds = judged.map(|cell| cell.declarations.upper);
         bounds.any(|upper| upper > most || upper.is_nan())
     };
     let holds = !arguments.max_rate.is_some_and(too_many);
@@ -103,6 +105,7 @@ fn plan(arguments: &Arguments) -> Result<AvailabilityPlan, BadInput> {
         hours: arguments.hours,
         seed: arguments.seed,
         only: arguments.drives.clone(),
+        level: arguments.level.level,
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::reports::handover::report;
 use clap::Args;
-use haptic_batch::handover::{EVERY_S, HandoverRow, study};
+use haptic_evidence::handover::{EVERY_S, HandoverRow, study};
 
 use host_sim::cli::progress::Threads;
 use host_sim::cli::results::ResultArguments;

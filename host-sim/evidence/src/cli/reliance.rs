@@ -2,7 +2,7 @@
 
 use crate::reports::reliance::report;
 use clap::Args;
-use haptic_batch::reliance::{ReliancePlan, study};
+use haptic_evidence::reliance::{ReliancePlan, study};
 use haptic_sim::input::in_range;
 
 use host_sim::cli::participants::{Participants, check_probe};

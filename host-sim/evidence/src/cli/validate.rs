@@ -3,8 +3,8 @@
 use crate::reports::validation::Validation;
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
-use haptic_batch::vehicle::coverage;
 use haptic_evidence::estimates::{POPULATION, changes, corruptions, methods, recordings, repeat};
+use haptic_evidence::vehicle::coverage;
 
 use host_sim::cli::participants::Drives;
 use host_sim::cli::results::ResultArguments;

@@ -18,7 +18,8 @@ use haptic_sim::models::sensors;
 use serde::Serialize;
 
 use super::rows::Rows;
-use haptic_batch::availability::{Listener, Rate, UNNAMED};
+use crate::declared::{Listener, UNNAMED};
+use haptic_batch::{Confidence, Rate};
 
 /// Rows further apart are a gap, in which nothing is sent, s.
 const GAP_S: f64 = 0.25;
@@ -248,7 +249,11 @@ pub(super) fn together<'a>(recordings: impl Iterator<Item = &'a [Fed]> + Clone) 
                 let is_of = |end: &&End| {
                     usize::from(end.shared) == part && name.is_none_or(|name| name == end.faults)
                 };
-                Rate::new(ends.iter().filter(is_of).count() as u64, guided_h[part])
+                Rate::new(
+                    ends.iter().filter(is_of).count() as u64,
+                    guided_h[part],
+                    Confidence::USUAL,
+                )
             }),
         };
         let mut causes: Vec<Ending> = names.iter().map(|name| ending(Some(name))).collect();

@@ -1,7 +1,7 @@
 //! What is shown of how often guidance leaves for nothing: tables and figures.
 
-use haptic_batch::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_campaign::campaign::CaseResult;
+use haptic_evidence::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_report::studies::place;
@@ -90,10 +90,13 @@ fn detection_figure(faults: &Detection) -> Figure {
 
 /// The study's document.
 pub(crate) fn report(results: &Balance) -> Report {
-    let caption = "False declarations in an hour with their exact 95 % interval; where there was none, the rate that is not exceeded \
-                   with 95 % confidence, which is large where little was driven. Beside them the time without guidance: two \
-                   seconds of handover and five until the driver asks again.";
     let own = &results.availability;
+    let caption = format!(
+        "False declarations in an hour with their exact {0} % interval; where there was none, the rate that is not exceeded with {0} % \
+         confidence, which is large where little was driven. Beside them the time without guidance: two seconds of handover and five \
+         until the driver asks again.",
+        own.level
+    );
     let blocks = vec![
         Block::figure("availability", figure(own), caption),
         Block::Table(table(own)),
@@ -122,10 +125,10 @@ fn finding(rate: &Rate, hours: f64) -> String {
     match (rate.count, hours > 0.0) {
         (_, false) => "nothing is known".into(),
         (0, true) => {
-            let decimals = if rate.upper_95 < 1.0 { 4 } else { 1 };
+            let decimals = if rate.upper < 1.0 { 4 } else { 1 };
             format!(
                 "no event in {hours:.2} h: at most {:.decimals$} an hour",
-                rate.upper_95
+                rate.upper
             )
         }
         _ => format!(
@@ -135,8 +138,14 @@ fn finding(rate: &Rate, hours: f64) -> String {
     }
 }
 
+/// Head of the column of rates.
+fn confidence(results: &Availability) -> String {
+    format!("Rate, {} % confidence", results.level)
+}
+
 /// Every world on every road; the roads of a judged one together.
 fn table(results: &Availability) -> Table {
+    let confidence = confidence(results);
     let row = |row: &Row| {
         let judged = if row.judged { "judged" } else { "beyond" };
         let rate = finding(&row.declarations, row.hours);
@@ -147,8 +156,8 @@ fn table(results: &Availability) -> Table {
             ("Judged", Cell::text(judged)),
             ("Hours", Cell::number(row.hours, 2)),
             ("False declarations", Cell::count(row.declarations.count)),
-            ("Rate, 95 % confidence", Cell::Text(rate)),
-            ("At most (1/h)", Cell::number(row.declarations.upper_95, 4)),
+            (confidence.as_str(), Cell::Text(rate)),
+            ("At most (1/h)", Cell::number(row.declarations.upper, 4)),
             ("Cars with one", Cell::Text(with_one)),
             ("Time without guidance (%)", Cell::number(away_percent(row), 2)),
             ("Latched", Cell::count(row.latched)),
@@ -162,15 +171,17 @@ fn table(results: &Availability) -> Table {
 
 /// False declarations by the faults that the ECU named.
 fn causes(results: &Availability) -> Table {
+    let confidence = confidence(results);
+    let confidence = confidence.as_str();
     let rows = results.cells.iter().flat_map(|row| {
-        row.causes.iter().map(|cause| {
+        row.causes.iter().map(move |cause| {
             let rate = finding(&cause.rate, row.hours);
             [
                 ("World", Cell::text(row.world)),
                 ("Road", Cell::text(row.road)),
                 ("Faults", Cell::text(&cause.faults)),
                 ("Declarations", Cell::count(cause.rate.count)),
-                ("Rate, 95 % confidence", Cell::Text(rate)),
+                (confidence, Cell::Text(rate)),
             ]
         })
     });
@@ -236,7 +247,7 @@ fn figure(results: &Availability) -> Figure {
     let rates = seen().map(|(x, row)| (x, row.declarations.per_hour)).collect();
     let intervals = seen().map(|(_, row)| row.declarations.interval).collect();
     let none = places().filter(|(_, row)| row.declarations.count == 0);
-    let bounds: Vec<_> = none.map(|(x, row)| (x, row.declarations.upper_95)).collect();
+    let bounds: Vec<_> = none.map(|(x, row)| (x, row.declarations.upper)).collect();
     let away = places().map(|(x, row)| (x, away_percent(row))).collect();
     // From zero; what was seen is not made small by how little the rest was driven.
     let most =
@@ -250,8 +261,18 @@ fn figure(results: &Availability) -> Figure {
     };
     let seen = Mark::Whiskers(intervals);
     let rates = [
-        Series::with_mark("seen, with the 95 % interval", 1, seen, rates),
-        Series::with_mark("none seen: at most (95 %)", 0, Mark::Bounds, bounds),
+        Series::with_mark(
+            &format!("seen, with the {} % interval", results.level),
+            1,
+            seen,
+            rates,
+        ),
+        Series::with_mark(
+            &format!("none seen: at most ({} %)", results.level),
+            0,
+            Mark::Bounds,
+            bounds,
+        ),
     ];
     let rate = Axis::new("Rate", "1/h").within(0.0, most_rate);
     let most_away = most(&mut results.cells.iter().map(away_percent));
@@ -270,7 +291,7 @@ fn figure(results: &Availability) -> Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptic_batch::availability::Lost;
+    use haptic_evidence::availability::{Confidence, Lost};
 
     fn cell(count: u64, hours: f64) -> Row {
         Row {
@@ -279,7 +300,7 @@ mod tests {
             judged: true,
             hours,
             available: 1.0,
-            declarations: Rate::new(count, hours),
+            declarations: Rate::new(count, hours, Confidence::USUAL),
             causes: Vec::new(),
             cars: 1,
             cars_with: 0,
@@ -301,6 +322,7 @@ mod tests {
         let results = Availability {
             seed: 1,
             hours: 0.1,
+            level: Confidence::USUAL,
             cells: vec![cell(0, 1.0 / 12.0), cell(3, 2.0), cell(0, 0.0)],
             together: Vec::new(),
             segments: Vec::new(),

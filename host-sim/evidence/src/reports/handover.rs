@@ -1,6 +1,8 @@
 //! What the handover study shows: tables and a figure.
 
-use haptic_batch::handover::{Bend, Figure as Found, HandoverResults, HandoverRow, RELIANCES, TAKES_OVER_S};
+use haptic_evidence::handover::{
+    Bend, Figure as Found, HandoverResults, HandoverRow, RELIANCES, TAKES_OVER_S,
+};
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Panel, Series};
 

@@ -1,6 +1,6 @@
 //! What the study of the live estimate shows.
 
-use haptic_batch::reliance::{
+use haptic_evidence::reliance::{
     Accuracy, Example, NEAR, ParticipantResult, REMNANT, RelianceResults, SETTLING_S,
 };
 use haptic_report::document::{Block, Cell, Report, Section, Table};

@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use super::changes;
 use haptic_batch::experiment::ExperimentPlan;
-use haptic_batch::vehicle::VehicleCoverage;
 use haptic_evidence::estimates::{
     Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
 };
+use haptic_evidence::vehicle::VehicleCoverage;
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Panel, Series};
 use haptic_report::studies::place;

@@ -1,6 +1,6 @@
 //! What is shown of how right identified vehicles are.
 
-use haptic_batch::vehicle::{Covered, VehicleCoverage};
+use haptic_evidence::vehicle::{Covered, VehicleCoverage};
 use haptic_report::document::{Cell, Table};
 use haptic_report::plot::{Axis, Figure, Series};
 use haptic_report::studies::place;

@@ -1,7 +1,7 @@
 //! Metrics as tables: the values of several runs, and what they mean.
 
 use super::{Cell, Table};
-use haptic_analysis::metrics::{DEFINITIONS, Definition, Metrics};
+use haptic_metrics::{DEFINITIONS, Definition, Metrics};
 
 /// One row per run: what tells the runs apart (`keys`), then the metrics that `shown` picks.
 pub fn metrics_table(

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::plot::{Axis, Panel, Series};
-use haptic_analysis::metrics::{DEFINITIONS, Metrics};
+use crate::studies::compare::{driver_kinds, law_kinds};
+use haptic_metrics::{DEFINITIONS, Metrics};
 use std::fs;
 use std::io;
 
@@ -245,6 +246,30 @@ fn a_metrics_table_shows_the_chosen_metrics_with_units() {
         }
     );
     assert_eq!(definitions_table().rows.len(), DEFINITIONS.len());
+}
+
+/// Rows as they are published, written by hand.
+#[test]
+fn what_a_file_may_name_is_a_table_in_markdown() {
+    let has = |table: Table, row: &str| {
+        let text = table.to_markdown();
+        assert!(text.lines().any(|line| line == row), "{text}");
+    };
+    has(law_kinds(), "| Kind | Source | Parameters |");
+    has(
+        law_kinds(),
+        "| `band` | Petermeijer et al. 2015, 2020 (descriptions) | `outer_m` 0.5 (0 to 2; tuned 0.1 to 0.5), `inner_m` 0.19* (0 to 2), \
+         `k_1` 0.25 (0 to 4; tuned 0.25 to 0.45) |",
+    );
+    has(
+        driver_kinds(),
+        "| `participant` | Wang et al. 2022, table 6 | `number` 1 (1 to 14) |",
+    );
+    has(driver_kinds(), "| `warning` | ours | `answers` 1* (0 to 1) |");
+    has(
+        definitions_table(),
+        "| Mean lateral error | mean_abs_lateral_error_m | m | Mean of \\|e\\|. | Wang et al. 2022, section 5 |",
+    );
 }
 
 #[test]

@@ -84,6 +84,20 @@ impl Table {
         }
         text
     }
+
+    /// The table's headings and rows in Markdown.
+    pub fn to_markdown(&self) -> String {
+        let line = |cells: &mut dyn Iterator<Item = String>| {
+            let cells: Vec<String> = cells.map(|cell| cell.replace('|', "\\|")).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let mut text = line(&mut self.columns.iter().cloned());
+        text.push_str(&format!("|{}\n", "---|".repeat(self.columns.len())));
+        for row in &self.rows {
+            text.push_str(&line(&mut row.iter().map(words)));
+        }
+        text
+    }
 }
 
 struct TextColumn<'a> {

@@ -5,6 +5,9 @@ use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::compare::{Cell as Pair, CompareResults, LawResult, Metric, Ratio};
 use haptic_batch::{Confidence, Mean};
+use haptic_sim::drivers::{DRIVERS, HABITS};
+use haptic_sim::kind::{Kind, Origin};
+use haptic_sim::laws::LAWS;
 
 /// Metrics of the terminal's matrices, and of the list of what a law makes worse.
 const FIRST: [&str; 4] = [
@@ -60,6 +63,41 @@ fn summary(results: &CompareResults) -> String {
         results.seeds,
         level = results.level,
     )
+}
+
+/// The laws that a file may name.
+pub fn law_kinds() -> Table {
+    kinds(LAWS.iter().map(kind))
+}
+
+/// The drivers that a file may name, and their habits.
+pub fn driver_kinds() -> Table {
+    kinds(DRIVERS.iter().chain(&HABITS).map(kind))
+}
+
+fn kinds(rows: impl Iterator<Item = [String; 3]>) -> Table {
+    let row = |row: [String; 3]| row.map(Cell::Text).to_vec();
+    Table::new("", ["Kind", "Source", "Parameters"], rows.map(row))
+}
+
+/// Name, source, and each parameter with its default, a star where that was chosen here, its range, and what tuning varies.
+fn kind<P: ?Sized>(kind: &Kind<P>) -> [String; 3] {
+    let parameters = kind.parameters.iter().map(|p| {
+        let star = if p.origin == Origin::Ours { "*" } else { "" };
+        let tuned = p
+            .tuned
+            .map_or(String::new(), |[low, high]| format!("; tuned {low} to {high}"));
+        format!(
+            "`{}` {}{star} ({} to {}{tuned})",
+            p.name, p.default, p.range[0], p.range[1]
+        )
+    });
+    let parameters: Vec<String> = parameters.collect();
+    [
+        format!("`{}`", kind.name),
+        kind.source.into(),
+        parameters.join(", "),
+    ]
 }
 
 type Count = fn(&Pair) -> usize;

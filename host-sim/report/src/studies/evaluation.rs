@@ -8,9 +8,9 @@ use crate::document::{
     metrics_table, write_trace,
 };
 use crate::plot::{Axis, Band, Figure, Marker, Panel, Series, Shade};
-use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::RunRecord;
 use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, EvaluationResults};
+use haptic_metrics::{DEFINITIONS, Definition};
 use haptic_sim::models::road::PAPER_COURSE;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
 use haptic_sim::simulation::Run;

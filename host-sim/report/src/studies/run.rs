@@ -8,11 +8,11 @@ use crate::document::{
     write_trace,
 };
 use crate::plot::{Axis, Figure, Panel, Series};
-use haptic_analysis::metrics::{DEFINITIONS, Definition};
-use haptic_batch::reliance::Reading;
+use haptic_batch::readings::Reading;
 use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::trace::Sample;
 use haptic_log::{Event, candump};
+use haptic_metrics::{DEFINITIONS, Definition};
 use haptic_sim::scenario::FailureKind;
 use haptic_sim::simulation::Ending;
 

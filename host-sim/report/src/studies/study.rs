@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
-use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::Away;
 use haptic_batch::study::{
     Difference, Recorded, Session, SessionResult, Source, StudyResults, Subject, of_participants,
 };
 use haptic_log::table::TableWriter;
+use haptic_metrics::{DEFINITIONS, Definition};
 
 /// The document of a study.
 pub fn report(results: &StudyResults) -> Report {

@@ -1,7 +1,7 @@
 //! What is shown of an identified vehicle.
 
 use crate::document::{Block, Cell, Report, Section, Table};
-use haptic_analysis::vehicle::{
+use haptic_vehicle::{
     Check, MOST_LATERAL_M_PER_S2, Manoeuvre, Part, Quantity, VehicleIdentification, Verdict,
 };
 

@@ -49,6 +49,6 @@ fn availability_row(title: &str, cell: &Cell) -> Vec<String> {
         declared,
         at_most.map_or("nothing is known".into(), |rate| format!("{rate:.4}")),
         count(cell.diverged),
-        count(cell.lost_by_hand.legs),
+        count(cell.lost_by_hand.segments),
     ]
 }

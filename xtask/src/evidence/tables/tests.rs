@@ -237,7 +237,7 @@ fn a_world_has_a_line_with_its_bound() {
     let head = r#"{"command":"c","commit":"0123456789abcdef","date":"d","rule":{"hours":52.0},"count":{"hours":52.0},"first_seed":77,"held_out":true}"#;
     let cell = |road: &str, count: u64, upper: &str| {
         format!(
-            r#"{{"world":"events","road":"{road}","hours":103.583,"declarations":{{"count":{count},"upper_95":{upper}}},"causes":[{{"faults":"LaneStep","rate":{{"count":{count},"upper_95":null}}}}],"diverged":0,"lost_by_hand":{{"legs":9}}}}"#
+            r#"{{"world":"events","road":"{road}","hours":103.583,"declarations":{{"count":{count},"upper_95":{upper}}},"causes":[{{"faults":"LaneStep","rate":{{"count":{count},"upper_95":null}}}}],"diverged":0,"lost_by_hand":{{"segments":9}}}}"#
         )
     };
     let text = [head.into(), cell("country", 0, "null"), cell("all", 3, "0.07486")].join("\n");

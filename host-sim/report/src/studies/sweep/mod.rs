@@ -6,9 +6,9 @@ mod words;
 
 use crate::document::{Block, Cell, Provenance, Report, Section, Table, definitions_table};
 use figures::{distribution, influence, responses};
-use haptic_analysis::metrics::Definition;
 use haptic_batch::Away;
 use haptic_batch::sweep::{DesignPoint, Driven, Summary, Sweep};
+use haptic_metrics::Definition;
 
 use tables::{short_tables, tables};
 

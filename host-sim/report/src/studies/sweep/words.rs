@@ -1,7 +1,7 @@
 //! Metrics in words, and the order of fields.
 
-use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::sweep::{Effect, Summary};
+use haptic_metrics::{DEFINITIONS, Definition};
 
 fn definition(metric: &str) -> Option<&'static Definition> {
     DEFINITIONS.iter().find(|d| d.name == metric)

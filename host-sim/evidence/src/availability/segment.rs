@@ -14,7 +14,7 @@ use super::drive::{by_hand, manual, with_ecu};
 use super::roads::falling_and_rising;
 use super::{CARS, Road, WorldKind};
 use crate::declared::{Declaration, Reported};
-use crate::error::StudyError;
+use haptic_batch::StudyError;
 
 /// Which segment.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@ use haptic_sim::scenario::Speed;
 use haptic_sim::worlds::WORLDS;
 
 use super::*;
-use crate::engine::{Watch, on_threads, run};
+use haptic_batch::engine::{Watch, on_threads, run};
 
 /// Exact limits of a Poisson count as tables print them (Garwood 1936; Ulm 1990): 0 to 3.689, 0.0253 to 5.572, 4.795 to
 /// 18.39, 81.36 to 121.63; and three for the one-sided limit of none.
@@ -14,14 +14,14 @@ fn intervals_are_those_of_the_tables() {
         (10, 4.795, 18.390),
         (100, 81.364, 121.627),
     ] {
-        let [from, to] = Rate::new(count, 1.0).interval;
+        let [from, to] = Rate::new(count, 1.0, Confidence::USUAL).interval;
         assert!(
             (from - low).abs() < 6e-4 && (to - high).abs() < 6e-4,
             "{count}: {from} {to}"
         );
     }
-    assert!((Rate::new(0, 1.0).upper_95 - 2.9957).abs() < 1e-4);
-    assert!((Rate::new(0, 300.0).upper_95 - 0.009_986).abs() < 1e-6);
+    assert!((Rate::new(0, 1.0, Confidence::USUAL).upper - 2.9957).abs() < 1e-4);
+    assert!((Rate::new(0, 300.0, Confidence::USUAL).upper - 0.009_986).abs() < 1e-6);
 }
 
 fn plan(hours: f64) -> AvailabilityPlan {
@@ -32,6 +32,7 @@ fn plan(hours: f64) -> AvailabilityPlan {
         hours,
         seed: 1,
         only: Vec::new(),
+        level: Confidence::USUAL,
     }
 }
 
@@ -217,7 +218,7 @@ fn a_drive_that_is_lost_by_hand_is_counted_apart() {
     assert!(
         none.cells
             .iter()
-            .all(|cell| cell.declarations.upper_95.is_nan() && cell.hours == 0.0)
+            .all(|cell| cell.declarations.upper.is_nan() && cell.hours == 0.0)
     );
 }
 
@@ -302,7 +303,7 @@ fn legs_are_the_same_side_by_side() {
                 .find(|number| segment.is(number))
                 .unwrap();
             // As the file has it, which tells 0 from -0.
-            let text = |segment: &DriveSegment| toml::to_string(segment).unwrap();
+            let text = |segment: &DriveSegment| serde_json::to_string(segment).unwrap();
             assert_eq!(text(segment), text(&number.drive(1).unwrap()), "{name}");
         }
     }

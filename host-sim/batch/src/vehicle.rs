@@ -1,16 +1,13 @@
-//! The vehicle of a recorded drive as a scenario's tables, and how right such vehicles are.
-
-mod coverage;
+//! The vehicle of a recorded drive as a scenario's tables.
 
 use std::fmt::Write;
 
-pub use coverage::{Covered, VehicleCoverage, coverage};
-use haptic_analysis::vehicle::{
-    Known, Quantity, VehicleColumns, VehicleIdentification, VehicleLog, Verdict, identify_vehicle,
-};
 use haptic_log::recording::Recording;
 use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::scenario::Scenario;
+use haptic_vehicle::{
+    Known, Quantity, VehicleColumns, VehicleIdentification, VehicleLog, Verdict, identify_vehicle,
+};
 
 use crate::error::StudyError;
 

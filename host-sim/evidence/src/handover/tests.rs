@@ -1,5 +1,5 @@
 use super::*;
-use crate::engine::Watch;
+use haptic_batch::engine::Watch;
 
 /// Four instants of the paper's curve: the peaks of both sides, driver by driver.
 #[test]

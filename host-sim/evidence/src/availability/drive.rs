@@ -13,8 +13,8 @@ use haptic_vectorised::Options;
 use super::events::Eventful;
 use super::{ByHand, DriveSegment, SEGMENT_S, SegmentNumber};
 use crate::declared::{Listener, Reported};
-use crate::engine::Part;
-use crate::error::StudyError;
+use haptic_batch::StudyError;
+use haptic_batch::engine::Part;
 
 const LEG_STEPS: u32 = (SEGMENT_S * 1e3) as u32;
 

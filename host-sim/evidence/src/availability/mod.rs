@@ -9,7 +9,7 @@
 //! vehicle that leaves the road is no false declaration. So every segment is driven a second time without guidance, whatever
 //! the first time showed, and a segment that is *lost by hand* is counted apart, with its hours.
 //!
-//! Legs of one number and road share course, driver, car and noise in every world, so that worlds can be
+//! Segments of one number and road share course, driver, car and noise in every world, so that worlds can be
 //! compared. A segment depends on the seed and on its own number alone: in whatever order and in however many sittings segments
 //! are driven, the results are the same.
 //!
@@ -24,12 +24,12 @@ use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
 
 pub use crate::declared::{Declaration, Listener, Reported, UNNAMED};
-pub use crate::statistics::Rate;
+pub use haptic_batch::{Confidence, Rate};
 pub use roads::{ROADS, Road};
 pub use segment::{ByHand, DriveSegment, Ended, SegmentNumber};
 
-use crate::engine::{Part, Plan, Resumed, Store, Study};
-use crate::error::StudyError;
+use haptic_batch::StudyError;
+use haptic_batch::engine::{Part, Plan, Resumed, Store, Study};
 
 /// Length of a segment, s.
 pub const SEGMENT_S: f64 = 300.0;
@@ -49,6 +49,8 @@ pub struct AvailabilityPlan {
     pub seed: u64,
     /// These segments in place of hours of them; none: the hours.
     pub only: Vec<u32>,
+    /// How often intervals hold the rate that they are of.
+    pub level: Confidence,
 }
 
 impl AvailabilityPlan {
@@ -132,11 +134,11 @@ pub struct Cell {
     pub cars: usize,
     /// Cars that had a false declaration.
     pub cars_with: usize,
-    /// Legs that ended in a latched fault.
+    /// Segments that ended in a latched fault.
     pub latched: usize,
-    /// Legs in which the vehicle left the road, and by hand does not.
+    /// Segments in which the vehicle left the road, and by hand does not.
     pub diverged: usize,
-    /// Legs in which it leaves the road by hand too: nothing above counts them.
+    /// Segments in which it leaves the road by hand too: nothing above counts them.
     pub lost_by_hand: Lost,
     /// Standard deviation of the lateral position (SDLP), m: mean over the segments.
     pub sdlp_m: f64,
@@ -144,11 +146,10 @@ pub struct Cell {
     pub largest_error_m: f64,
 }
 
-/// Legs that say nothing of guidance.
+/// Segments that say nothing of guidance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lost {
     /// How many.
-    #[serde(rename = "legs")]
     pub segments: usize,
     /// How long they were driven with guidance at hand, h.
     pub hours: f64,
@@ -172,12 +173,14 @@ pub struct Availability {
     pub seed: u64,
     /// Hours asked for in each world on each road.
     pub hours: f64,
+    /// How often intervals hold the rate that they are of.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
     /// By world and road.
     pub cells: Vec<Cell>,
     /// Judged worlds, their roads together, if there are several.
     pub together: Vec<Cell>,
-    /// Legs of judged worlds in which the ECU left, or the vehicle left the road, with guidance or by hand.
-    #[serde(rename = "legs")]
+    /// Segments of judged worlds in which the ECU left, or the vehicle left the road, with guidance or by hand.
     pub segments: Vec<DriveSegment>,
 }
 
@@ -207,7 +210,7 @@ fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability 
     let of_cell = &of_cell;
     let cells = plan.worlds.iter().flat_map(|world| {
         let roads = plan.roads.iter();
-        roads.map(move |road| cell(world, road.name, &of_cell(world, road)))
+        roads.map(move |road| cell(world, road.name, &of_cell(world, road), plan.level))
     });
     let cells = cells.collect();
     let several = plan
@@ -216,7 +219,7 @@ fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability 
         .filter(|world| world.judged && plan.roads.len() > 1);
     let together = several.map(|world| {
         let on_all: Vec<&DriveSegment> = plan.roads.iter().flat_map(|road| of_cell(world, road)).collect();
-        cell(world, "all", &on_all)
+        cell(world, "all", &on_all, plan.level)
     });
     let together = together.collect();
     let numbers = plan.segments();
@@ -228,13 +231,14 @@ fn summary(plan: &AvailabilityPlan, segments: &[&DriveSegment]) -> Availability 
     Availability {
         seed: plan.seed,
         hours: plan.hours,
+        level: plan.level,
         cells,
         together,
         segments: happened.collect(),
     }
 }
 
-fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment]) -> Cell {
+fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment], level: Confidence) -> Cell {
     let (lost, segments): (Vec<&DriveSegment>, Vec<&DriveSegment>) = segments
         .iter()
         .copied()
@@ -253,7 +257,7 @@ fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment]) -> Ce
         .chunk_by(|a, b| a == b)
         .map(|same| Cause {
             faults: same[0].into(),
-            rate: Rate::new(same.len() as u64, hours),
+            rate: Rate::new(same.len() as u64, hours, level),
         })
         .collect();
     causes.sort_by_key(|cause| std::cmp::Reverse(cause.rate.count));
@@ -272,7 +276,7 @@ fn cell(world: &WorldKind, road: &'static str, segments: &[&DriveSegment]) -> Ce
         judged: world.judged,
         hours,
         available: sum(|segment| segment.active_s) / (3600.0 * hours),
-        declarations: Rate::new(declared().count() as u64, hours),
+        declarations: Rate::new(declared().count() as u64, hours, level),
         causes,
         cars: cars(false),
         cars_with: cars(true),

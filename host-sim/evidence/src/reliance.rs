@@ -14,10 +14,10 @@
 
 use serde::Serialize;
 
-pub use crate::readings::{Reading, Readings};
+pub use haptic_batch::readings::{Reading, Readings};
 
-use crate::engine::{Watch, each};
-use crate::error::{StudyError, refuse};
+use haptic_batch::engine::{Watch, each};
+use haptic_batch::{StudyError, refuse};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::DriverParameters;

@@ -24,11 +24,11 @@ pub use bend::{Bend, Side};
 use instants::{Instant, instants, row};
 pub use results::{Figure, HandoverResults, HandoverRow, MOST_BESIDE_DROP, Place};
 
-use crate::Away;
-use crate::engine::{Watch, runs};
-use crate::error::StudyError;
-use crate::paper::DRIVERS_T_P;
-use crate::record::peak_m;
+use haptic_batch::Away;
+use haptic_batch::StudyError;
+use haptic_batch::engine::{Watch, runs};
+use haptic_batch::paper::DRIVERS_T_P;
+use haptic_batch::peak_m;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario};

@@ -1,6 +1,5 @@
 //! How often the 95 % intervals of `identify-vehicle` hold the truth, on simulated drives of vehicles that nothing was tuned on.
 
-use haptic_analysis::vehicle::{Known, VehicleColumns, VehicleLog, Verdict, identify_vehicle};
 use haptic_log::trace::Trace;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::nonlinear::{Tyres, WorldParameters};
@@ -9,13 +8,14 @@ use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::scenario::{Condition, Scenario, Speed};
 use haptic_sim::share::wilson;
 use haptic_sim::simulation::simulate;
+use haptic_vehicle::{Known, VehicleColumns, VehicleLog, Verdict, identify_vehicle};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use serde::Serialize;
 
-use crate::engine::{Watch, each};
-use crate::error::StudyError;
+use haptic_batch::StudyError;
+use haptic_batch::engine::{Watch, each};
 
 /// CommonRoad's vehicles 1 to 3 (a Ford Escort, a BMW 320i, a VW Vanagon): mass, yaw inertia, l_f, l_r; their tyres give 21.92 times
 /// their load per radian. Columns, ratios and frictions are ours: inertia, damping, trail, ratio, friction.
