@@ -86,14 +86,15 @@ const SIDE_BY_SIDE: [&str; 3] = ["availability/drive.rs", "recorder.rs", "sweep/
 #[rustfmt::skip]
 const PACKAGES: Arrows = &[
     ("core", &[]),
-    ("firmware", &["haptic-core", "haptic-lockstep"]),
+    ("core/diag", &["haptic-core"]),
+    ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
     ("host-sim/vectorised", &["haptic-core", "haptic-log", "haptic-sim"]),
     ("host-sim/analysis", &["haptic-log"]),
     ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim", "haptic-vectorised"]),
-    ("host-sim/pil", &["haptic-core", "haptic-lockstep"]),
+    ("host-sim/pil", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-sim"]),
     // Beside these the command line's own parts, of host-sim.
