@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::ParameterStatus;
+use haptic_core::bus::messages::{ParameterStatus, WriteOutcome};
 use haptic_core::safety::faults::Fault;
 use haptic_diag::data::{Datum, LONGEST};
 pub use haptic_diag::data::{Entry, Format, entries};
@@ -174,7 +174,17 @@ impl Tester {
             self.standing = Some((self.product.send_standstill()?, Instant::now()));
         }
         let [high, low] = COMMIT.to_be_bytes();
-        self.ask(&[0x31, 0x01, high, low])?;
+        match self.answer(&[0x31, 0x01, high, low])? {
+            Ok(_) => {}
+            Err(code @ 0x88) => {
+                let now = ParameterStatus {
+                    outcome: WriteOutcome::NotStanding,
+                    ..*before
+                };
+                return Ok(Err((now, refusal(0x31, code).to_string())));
+            }
+            Err(code) => return Err(refusal(0x31, code)),
+        }
         let until = Instant::now() + HANDED_OVER;
         while Instant::now() < until {
             self.stand()?;
@@ -258,7 +268,6 @@ impl Tester {
 
 /// Our own speeds were too old when the set came, or its unlocking was.
 fn is_late(now: &ParameterStatus) -> bool {
-    use haptic_core::bus::messages::WriteOutcome;
     matches!(now.outcome, WriteOutcome::NotStanding | WriteOutcome::NotUnlocked)
 }
 
