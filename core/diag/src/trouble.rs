@@ -244,7 +244,7 @@ fn seal(cells: &mut Cells, place: usize, words: [u32; WORDS - 1]) {
     }
 }
 
-/// Of a cell in its place, in this layout.
+/// The CRC of a cell in its place, in this layout.
 #[expect(clippy::as_conversions, reason = "an index of at most 32")]
 fn checksum(words: &[u32; WORDS - 1], place: usize) -> u32 {
     let mut digest = CRC.digest();

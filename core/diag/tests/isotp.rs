@@ -1,3 +1,4 @@
+use crate::rig::inputs;
 use haptic_diag::isotp::{Bytes, Link};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -260,7 +261,7 @@ fn noise_makes_no_panic() {
     let mut link = Small::NEW;
     let mut now = u32::MAX - 100_000;
     let mut messages = 0;
-    for _ in 0..300_000 {
+    for _ in 0..inputs(300_000) {
         let mut data: Vec<u8> = (0..random.random_range(0..=8)).map(|_| random.random()).collect();
         if let (Some(head), true) = (data.first_mut(), random.random_bool(0.7)) {
             *head &= 0x33;

@@ -42,7 +42,7 @@ fn drive(ms: u32) -> Vec<Frame> {
     .collect()
 }
 
-/// As many questions as the bus has room for, of every kind: each has to be worked out, some of them with a MAC, and long answers wait
+/// Questions, as many as the bus has room for, of every kind: each has to be worked out, some of them with a MAC, and long answers wait
 /// for flow control.
 fn questions(ms: u32) -> [Frame; 3] {
     const QUESTIONS: [&[u8]; 8] = [

@@ -35,6 +35,8 @@ const ANSWER: usize = 160;
 pub const SESSION_MS: u32 = 5000;
 /// An answer comes within 50 ms, and never later (P2, and P2* in tens of milliseconds).
 const TIMES: [u8; 4] = [0x00, 0x32, 0x01, 0xF4];
+/// A reset comes so long after it was asked for, ms: the answer leaves the controller of the bus before.
+const RESET_MS: u32 = 50;
 /// The bit of a sub-function that asks for no positive answer.
 const SILENT: u8 = 0x80;
 
@@ -115,7 +117,8 @@ pub struct Server {
     writing: Writing,
     troubles: Troubles,
     ear: Ear,
-    is_reset_due: bool,
+    /// When a reset that was asked for comes.
+    reset_ms: Option<u32>,
 }
 
 impl Server {
@@ -133,7 +136,7 @@ impl Server {
             writing: Writing::NEW,
             troubles: Troubles::new(cells),
             ear: Ear::default(),
-            is_reset_due: false,
+            reset_ms: None,
         }
     }
 
@@ -159,7 +162,10 @@ impl Server {
         if self.link.is_sending() {
             // Whoever takes an answer is there.
             self.asked_ms = now_ms;
-        } else if self.is_reset_due {
+        } else if self
+            .reset_ms
+            .is_some_and(|asked_ms| now_ms.wrapping_sub(asked_ms) >= RESET_MS)
+        {
             return Wish::Reset;
         } else if now_ms.wrapping_sub(self.asked_ms) > SESSION_MS && self.session != UdsSessionType::Default {
             self.enter(UdsSessionType::Default);
@@ -305,7 +311,7 @@ impl Server {
         none(rest)?;
         self.ask_for_security()?;
         now.ask_for_standstill()?;
-        self.is_reset_due = true;
+        self.reset_ms = Some(now.now_ms);
         Ok(())
     }
 

@@ -376,7 +376,7 @@ mod tests {
         assert_eq!(value("vehicle_number=7").unwrap().1, Reading::Whole(7));
         for (text, expected) in [
             ("torque_limit_nm", "NAME=VALUE"),
-            ("torque_limit_nm=5.5", "from 0 to 5"),
+            ("torque_limit_nm=5.5", "to 5 N.m"),
             ("torque_limit_nm=soft", "no number"),
             ("vehicle_number=1.5", "no number"),
             ("mode=1", "only be read"),
