@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use crate::tool::{command, root, run};
 
 /// What the tests of the package, its examples, and the peers of recordings, FMUs and diagnosis need.
-pub(crate) const PACKAGES: [&str; 22] = [
+pub(crate) const PACKAGES: [&str; 23] = [
     "asammdf",
     "can-isotp",
     "cantools",
@@ -22,6 +22,7 @@ pub(crate) const PACKAGES: [&str; 22] = [
     "mypy",
     "nbclient",
     "numpy",
+    "odxtools",
     "pandas",
     "pyarrow",
     "pyserial",
