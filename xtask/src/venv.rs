@@ -7,8 +7,9 @@ use anyhow::{Context, Result};
 use crate::tool::{command, root, run};
 
 /// What the tests of the package, its examples, and the peers of recordings and FMUs need.
-pub(crate) const PACKAGES: [&str; 18] = [
+pub(crate) const PACKAGES: [&str; 19] = [
     "asammdf",
+    "canmatrix",
     "cantools",
     "commonroad-vehicle-models",
     "distributed",
