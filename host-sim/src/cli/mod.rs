@@ -39,7 +39,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use haptic_sim::input::did_you_mean;
+use haptic_log::near::did_you_mean;
 use serde::Serialize;
 
 pub use names::signed;
