@@ -194,7 +194,10 @@ pub fn status(result: Result<Outcome, BadInput>) -> ExitCode {
         Ok(Outcome::Failed) => ExitCode::from(1),
         Ok(Outcome::Interrupted) => ExitCode::from(INTERRUPTED),
         Err(BadInput(message)) => {
-            eprintln!("error: {message}");
+            let words: Vec<String> = std::env::args_os()
+                .map(|word| word.to_string_lossy().into_owned())
+                .collect();
+            eprintln!("error: {}", names::as_written(message, &words));
             ExitCode::from(2)
         }
     }
