@@ -5,7 +5,6 @@
 mod bench;
 mod bindings_agree;
 mod boards;
-mod book;
 mod built;
 mod by_hand;
 mod c_library;
@@ -32,6 +31,7 @@ mod python;
 mod qemu;
 mod release;
 mod seal;
+mod site;
 mod size;
 mod speed;
 mod tool;
@@ -138,8 +138,9 @@ enum Command {
     Claim(claims::Claim),
     /// Lines of code by crate, without tests, comments and blanks, beside the budget of each (a test holds it).
     Lines,
-    /// The documents as a book to browse, in target/book/html (needs mdbook). Exit code 1 if a link leads nowhere.
-    Book,
+    /// Documents, lab and interfaces (Rust, Python) as a site of static files in target/site (needs mdbook). Exit code 1 if a
+    /// link of the documents leads nowhere.
+    Site(site::Options),
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim ecu pil` left behind.
@@ -209,7 +210,7 @@ fn main() -> ExitCode {
         Command::Trace { page: true, .. } => trace::page().map(|page| print!("{page}")),
         Command::Trace { .. } => trace::run(),
         Command::Lines => lines::print(tool::root()).map_err(Into::into),
-        Command::Book => book::build(),
+        Command::Site(options) => site::build(&options),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };

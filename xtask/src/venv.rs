@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use crate::tool::{command, root, run};
 
 /// What the tests of the package, its examples, and the peers of recordings, FMUs and diagnosis need.
-pub(crate) const PACKAGES: [&str; 24] = [
+pub(crate) const PACKAGES: [&str; 25] = [
     "asammdf",
     "can-isotp",
     "canmatrix",
@@ -25,6 +25,7 @@ pub(crate) const PACKAGES: [&str; 24] = [
     "numpy",
     "odxtools",
     "pandas",
+    "pdoc",
     "pyarrow",
     "pyserial",
     "pytest",

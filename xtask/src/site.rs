@@ -1,7 +1,8 @@
-//! The documents as a book that can be browsed: mdBook makes it of a copy of `docs/`.
+//! Everything that can be read, as one site of static files: the documents as a book, the lab, the interfaces in Rust and Python.
 //!
-//! In the copy a block of mathematics is set for MathJax, a link out of `docs/` leads to a copy of its file, and a table that a
-//! command prints stands where a page has `<!-- printed: COMMAND -->`. What the book then links to has to be there.
+//! mdBook makes the book of a copy of `docs/`. In the copy a block of mathematics is set for MathJax, a link out of `docs/` leads to
+//! a copy of its file, and a table that a command prints stands where a page has `<!-- printed: COMMAND -->`. What the book
+//! then links to has to be there.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -9,10 +10,19 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
 
 use crate::built::Built;
-use crate::tool::{self, command, output, root, run};
-use crate::trace;
+use crate::tool::{self, cargo, command, output, root, run};
+use crate::{python, trace, web};
+
+/// What `cargo xtask site` is asked for.
+#[derive(Args)]
+pub(crate) struct Options {
+    /// The documents alone, for which nothing is built
+    #[arg(long)]
+    book: bool,
+}
 
 const MDBOOK: &str = "mdbook";
 const INSTALL: &str = "cargo install mdbook --version 0.5.4";
@@ -24,28 +34,79 @@ const PRINTED: [&str; 2] = ["<!-- printed: ", " -->"];
 const REQUIREMENTS: &str = "cargo xtask trace --page";
 const FAULTS: &str = "cargo xtask faults --list";
 const NAMED: &str = "host-sim compare --list ";
+/// Crates that others build upon.
+const CRATES: [&str; 4] = ["haptic-core", "haptic-sim", "haptic-log", "haptic-analysis"];
+/// The page that leads out of the book, and to what.
+const INTERFACES: &str = "interfaces.md";
+const LAB: &str = "lab.html";
+const RUST: &str = "rust";
+const PYTHON: &str = "python";
 
-/// Makes the book in `target/book/html`; an error names links that lead nowhere.
-pub(crate) fn build() -> Result<()> {
+/// Makes the site in `target/site`; an error names links of the book that lead nowhere.
+pub(crate) fn build(options: &Options) -> Result<()> {
     if !tool::exists(MDBOOK) {
         return Err(tool::Usage(format!("mdbook is missing: {INSTALL}")).into());
     }
-    let place = root().join("target/book");
-    if place.exists() {
-        fs::remove_dir_all(&place).with_context(|| place.display().to_string())?;
+    let site = root().join("target/site");
+    let pages = root().join("target/site-pages");
+    for place in [&site, &pages] {
+        if place.exists() {
+            fs::remove_dir_all(place).with_context(|| place.display().to_string())?;
+        }
     }
-    let pages = place.join("docs");
     copy(&pages)?;
+    if !options.book {
+        lead_out(&pages)?;
+    }
     run(command(MDBOOK)
         .args(["build", &pages.to_string_lossy(), "--dest-dir"])
-        .arg(place.join("html")))?;
-    let broken = broken_links(&place.join("html"))?;
+        .arg(&site))?;
+    let of_the_book = files(&site)?;
+    if !options.book {
+        add_interfaces(&site)?;
+    }
+    let broken = broken_links(&of_the_book)?;
     for link in &broken {
         eprintln!("{link}");
     }
     ensure!(broken.is_empty(), "{} links lead nowhere", broken.len());
-    println!("{}", place.join("html/index.html").display());
+    println!("{}", site.join("index.html").display());
     Ok(())
+}
+
+/// Adds a page to the copy that leads to what is no page of the book.
+fn lead_out(pages: &Path) -> Result<()> {
+    let mut text = format!(
+        "# The lab and the interfaces\n\n- [The lab]({LAB}): the same controller, vehicle and driver in this browser\n\
+         - [The Python package]({PYTHON}/haptic_guidance.html)\n"
+    );
+    for name in CRATES {
+        let folder = name.replace('-', "_");
+        text.push_str(&format!("- [`{name}`]({RUST}/{folder}/index.html), in Rust\n"));
+    }
+    fs::write(pages.join(INTERFACES), text)?;
+    let summary = pages.join("SUMMARY.md");
+    let first = "# Tutorials\n";
+    let there = fs::read_to_string(&summary)?;
+    ensure!(there.contains(first), "docs/SUMMARY.md: no line {first:?}");
+    let with = format!("[The lab and the interfaces]({INTERFACES})\n\n{first}");
+    Ok(fs::write(&summary, there.replacen(first, &with, 1))?)
+}
+
+/// Puts the lab and the descriptions of the interfaces beside the book.
+fn add_interfaces(site: &Path) -> Result<()> {
+    fs::copy(web::pack(Built::ToShip)?, site.join(LAB))?;
+    let made = root().join("target/site-rust");
+    let mut doc = cargo();
+    doc.args(["doc", "--release", "--no-deps", "--target-dir"]).arg(&made);
+    for name in CRATES {
+        doc.args(["-p", name]);
+    }
+    run(&mut doc)?;
+    fs::rename(made.join("doc"), site.join(RUST))?;
+    run(python::with_package(Built::ForTests)?
+        .args(["-m", "pdoc", "--docformat", "numpy", "haptic_guidance", "haptic_guidance.envs", "-o"])
+        .arg(site.join(PYTHON)))
 }
 
 /// Copies `docs/`, and what its pages lead to outside of it.
@@ -206,14 +267,14 @@ fn normal(path: &Path) -> PathBuf {
     parts
 }
 
-/// Links of the book's pages to a file or a heading that is not there.
-fn broken_links(html: &Path) -> Result<Vec<String>> {
+/// Links of pages to a file or a heading that is not there.
+fn broken_links(pages: &[PathBuf]) -> Result<Vec<String>> {
     let mut broken = Vec::new();
-    for file in files(html)? {
+    for file in pages {
         if file.extension() != Some(OsStr::new("html")) || file.ends_with("404.html") {
             continue;
         }
-        let text = fs::read_to_string(&file)?;
+        let text = fs::read_to_string(file)?;
         for link in values(&text, "href") {
             if link.contains(':') {
                 continue;
@@ -280,8 +341,11 @@ mod tests {
                 asked.extend(text.lines().filter_map(printed).map(str::to_owned));
             }
         }
-        asked.sort();
-        assert_eq!(asked, [FAULTS, REQUIREMENTS]);
+        let tables = ["laws", "drivers", "metrics"].map(|what| format!("{NAMED}{what}"));
+        let known = |command: &String| {
+            [FAULTS, REQUIREMENTS].contains(&command.as_str()) || tables.contains(command)
+        };
+        assert!(!asked.is_empty() && asked.iter().all(known), "{asked:?}");
     }
 
     #[test]
