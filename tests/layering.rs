@@ -77,7 +77,8 @@ const SIDE_BY_SIDE: [&str; 3] = [
 #[rustfmt::skip]
 const PACKAGES: Arrows = &[
     ("core", &[]),
-    ("firmware", &["haptic-core", "haptic-lockstep"]),
+    ("core/diag", &["haptic-core"]),
+    ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
@@ -86,7 +87,7 @@ const PACKAGES: Arrows = &[
     ("host-sim/vehicle", &["haptic-log"]),
     ("host-sim/analysis", &["haptic-log"]),
     ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
-    ("host-sim/pil", &["haptic-core", "haptic-lockstep"]),
+    ("host-sim/pil", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
     // Beside these the command line's own parts, of host-sim.

@@ -17,14 +17,16 @@ use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
 use embedded_hal_nb::nb;
 use haptic_core::bus::messages::{Column, Message, ResetCause};
+use haptic_core::controller::Command;
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::service::rejections::Rejections;
+use haptic_diag::trouble::Cells;
 
 use crate::boards::{Board, ThisBoard};
-use crate::service::Service;
+use crate::service::{Origin, Restart, Service};
 use crate::storage::{self, Found};
 use crate::{analogue, image, reset, stack};
 
@@ -66,7 +68,13 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
     let params = params(&found).filter(|_| is_sound);
     let setup = params.and_then(|params| Setup::new(&params).ok());
     let ecu = begin(ecu, setup.as_ref(), boot);
-    let mut service = Service::new(found, params, boot);
+    let cells = reset::cells();
+    let origin = Origin {
+        boot,
+        is_image_whole: image == image::State::Whole,
+        key: is_sound.then(|| storage::key(board.flash())).flatten(),
+    };
+    let mut service = Service::new(found, params, origin, cells);
     let mut counts = Counts::default();
     defmt::info!(
         "steering-ecu on {=str}, reset cause {=u8}, resets of late {=u8}, parameters {=u32}",
@@ -90,7 +98,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
         receive(&mut board, ecu, &mut service, &mut counts);
         if board.tick() {
             disturb(ecu, boot, counts.steps);
-            step(&mut board, ecu, &mut service, &mut counts);
+            step(&mut board, ecu, &mut service, cells, &mut counts);
         }
     }
 }
@@ -192,7 +200,7 @@ fn control(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) -> Step {
     step
 }
 
-fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
+fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, cells: &mut Cells, counts: &mut Counts) {
     let step = control(board, ecu, counts);
     // A frame that finds no room is lost; the next follows in a millisecond, and the receiver's time-out
     // judges a bus that stays closed.
@@ -208,6 +216,7 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             counts.unsent = counts.unsent.wrapping_add(1);
         }
     }
+    diagnose(board, ecu, service, cells, &step.command, counts);
     // A light that fails is no reason to stop.
     let _ = board
         .status()
@@ -228,6 +237,31 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             stack::used(),
             stack::budget()
         );
+    }
+}
+
+/// Answers a tester: one request and one frame in a step.
+fn diagnose(
+    board: &mut ThisBoard,
+    ecu: &Ecu,
+    service: &mut Service,
+    cells: &mut Cells,
+    command: &Command,
+    counts: &Counts,
+) {
+    let restart = service.diagnose(cells, command, ecu, &counts.rejected, counts.steps);
+    if let Some(frame) = service.answer(counts.steps)
+        && board.can().transmit(&frame).is_ok()
+    {
+        service.answered(counts.steps);
+    }
+    if let Some(restart) = restart {
+        ThisBoard::zero_torque();
+        match restart {
+            Restart::With(set) => reset::restart_with(&set),
+            // As new parameters are: asked for over the bus, and no step towards locking within 10 s.
+            Restart::AsIs => reset::restart(ResetCause::NewParameters),
+        }
     }
 }
 

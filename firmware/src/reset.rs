@@ -5,6 +5,8 @@
 //! controller, which tells the bus and locks after too many. Faults of class C that were latched cross a reset in it
 //! too: they last until power-up, and a watchdog that nobody fed because the monitor forbade it is none.
 //!
+//! Codes of faults cross a reset here too (`haptic_diag::trouble`).
+//!
 //! New parameters cross a reset here too: they are stored at a start, when nothing moves and no watchdog runs.
 //!
 //! The record is kept twice, the second copy inverted, each with a CRC-32. One copy is enough. Without a whole one, what
@@ -244,7 +246,7 @@ impl Found {
 }
 
 #[cfg(target_os = "none")]
-pub use on_target::{boot, latch, restart, restart_with, settled, take_parameters};
+pub use on_target::{boot, cells, latch, restart, restart_with, settled, take_parameters};
 
 #[cfg(target_os = "none")]
 mod on_target {
@@ -252,6 +254,7 @@ mod on_target {
     use core::sync::atomic::{AtomicBool, Ordering};
 
     use haptic_core::service::stored::{self, BYTES, Set};
+    use haptic_diag::trouble::Cells;
 
     use super::{Boot, COPY, FaultSet, Found, Hardware, Record, ResetCause, Words};
 
@@ -264,6 +267,21 @@ mod on_target {
     /// A set of parameters for the next start to store, as one of its copies: its CRC tells it from noise.
     #[unsafe(link_section = ".uninit.parameters")]
     static mut PARAMETERS: MaybeUninit<[u8; BYTES]> = MaybeUninit::uninit();
+
+    /// Codes of faults, each with its own CRC.
+    #[unsafe(link_section = ".uninit.cells")]
+    static mut CELLS: MaybeUninit<Cells> = MaybeUninit::uninit();
+
+    /// The codes of faults, as the last start left them. To be called once.
+    pub fn cells() -> &'static mut Cells {
+        let cells = (&raw mut CELLS).cast::<Cells>();
+        // SAFETY: the only access, once; every pattern of bits is a value. What was there is read and written back as
+        // volatile, so that the compiler does not reason about what it does not see being written.
+        unsafe {
+            cells.write_volatile(cells.read_volatile());
+            &mut *cells
+        }
+    }
 
     /// What lies in the record's memory.
     fn read_record() -> Found {

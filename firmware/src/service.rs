@@ -1,5 +1,6 @@
-//! What an ECU says of its parameters, of itself and of frames that it did not use, and the sets that it takes over the
-//! bus. Behind the torque, which is on its way by then. Not here: where a set is stored, and the restart that it causes.
+//! What an ECU says of its parameters, of itself and of frames that it did not use, the sets that it takes over the
+//! bus, and its answers to a workshop's tester. Behind the torque, which is on its way by then. Not here: where a set is
+//! stored, and the restart that it causes.
 
 use core::num::NonZeroU32;
 
@@ -12,6 +13,9 @@ use haptic_core::safety::modes::Mode;
 use haptic_core::service::download::{self, Conditions, Download, mode_for_parameters};
 use haptic_core::service::rejections::Rejections;
 use haptic_core::service::stored::Set;
+use haptic_diag::security::Key;
+use haptic_diag::server::{Server, Situation, Wish};
+use haptic_diag::trouble::Cells;
 use heapless::Vec;
 
 use crate::boards::{Board, ThisBoard};
@@ -26,7 +30,32 @@ const STEPS_PER_LINE: u32 = 100;
 const VALUE_AT: u32 = 25;
 const REJECTION_AT: u32 = 75;
 
-/// What has to do with parameters.
+/// Commit that the image is built from, where the build says so.
+const COMMIT: &str = match option_env!("HAPTIC_COMMIT") {
+    Some(commit) => commit,
+    None => "nobody said",
+};
+
+/// What the firmware knows of itself when it starts.
+#[derive(Debug, Clone, Copy)]
+pub struct Origin {
+    /// Why it started.
+    pub boot: Boot,
+    /// The image is as it was built.
+    pub is_image_whole: bool,
+    /// What a tester has to know before it may write.
+    pub key: Option<Key>,
+}
+
+/// What a service asks of its image.
+pub enum Restart {
+    /// Store this set, and start with it.
+    With(Set),
+    /// Start anew.
+    AsIs,
+}
+
+/// What has to do with parameters, and with testers.
 pub struct Service {
     download: Download,
     /// The mode of the last step, which the download asks for.
@@ -34,7 +63,8 @@ pub struct Service {
     found: Found,
     /// The set in use; None while the controller is locked for want of one.
     in_use: Option<Params>,
-    boot: Boot,
+    origin: Origin,
+    server: Server,
     /// The last count of rejections that the log told.
     told: Option<Rejection>,
 }
@@ -42,13 +72,14 @@ pub struct Service {
 impl Service {
     /// The service of an ECU that starts up so, with what lies in its memory and the set that it uses.
     #[must_use]
-    pub const fn new(found: Found, in_use: Option<Params>, boot: Boot) -> Self {
+    pub fn new(found: Found, in_use: Option<Params>, origin: Origin, cells: &Cells) -> Self {
         Self {
+            server: Server::new(cells, origin.key),
             download: Download::NEW,
             mode: Mode::Boot,
             found,
             in_use,
-            boot,
+            origin,
             told: None,
         }
     }
@@ -61,14 +92,64 @@ impl Service {
 
     /// Takes a frame in the step of that number; the set that it completes.
     pub fn receive(&mut self, frame: &Frame, ecu: &Ecu, steps: u32) -> Option<Set> {
-        let conditions = Conditions {
+        self.server.receive(frame, steps);
+        self.download.receive(frame, &self.conditions(ecu, steps))
+    }
+
+    fn conditions(&self, ecu: &Ecu, steps: u32) -> Conditions {
+        Conditions {
             mode: self.mode,
             stands: ecu.stands(),
-            settled: reset::has_settled(self.boot.reset, steps),
+            settled: reset::has_settled(self.origin.boot.reset, steps),
             in_use: self.found.stored.map(|stored| stored.sequence),
             now_ms: steps,
+        }
+    }
+
+    /// Works for a tester behind the step of that number.
+    // A function of its own: what an answer takes is not on the stack of the step.
+    #[inline(never)]
+    pub fn diagnose(
+        &mut self,
+        cells: &mut Cells,
+        command: &Command,
+        ecu: &Ecu,
+        rejected: &Rejections,
+        steps: u32,
+    ) -> Option<Restart> {
+        let conditions = self.conditions(ecu, steps);
+        let is_damaged = self.found.damaged != [false, false];
+        let stored = self.found.stored.as_ref();
+        let situation = || Situation {
+            conditions,
+            outcome: self.download.status(stored, is_damaged).outcome,
+            in_use: self.in_use.as_ref(),
+            stored,
+            is_damaged,
+            is_image_whole: self.origin.is_image_whole,
+            reset: self.origin.boot.reset,
+            rejected: rejected.total(),
+            hardware: ThisBoard::hardware(),
+            cycles: ThisBoard::cycles(),
+            software: env!("CARGO_PKG_VERSION"),
+            commit: COMMIT,
         };
-        self.download.receive(frame, &conditions)
+        match self.server.step(cells, command, steps, situation) {
+            Wish::None => None,
+            Wish::Download(frame) => self.download.receive(&frame, &conditions).map(Restart::With),
+            Wish::Reset => Some(Restart::AsIs),
+        }
+    }
+
+    /// The frame of an answer that is due; [`Service::answered`] once it found its place.
+    #[must_use]
+    pub fn answer(&self, steps: u32) -> Option<Frame> {
+        self.server.frame(steps)
+    }
+
+    /// It did.
+    pub fn answered(&mut self, steps: u32) {
+        self.server.sent(steps);
     }
 
     /// What is to be said behind the step of that number.

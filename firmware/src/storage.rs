@@ -10,7 +10,8 @@
 //! one. It runs at each start, not at the next write, so that a damaged copy does not remain until the other one is
 //! damaged too.
 //!
-//! The copies lie in the last four pages of the flash they are given; the board's memory map leaves these out.
+//! The copies lie in the last four pages of the flash they are given, and the key for security access in the one before
+//! ([`key`]); the board's memory map leaves these out.
 //!
 //! Two regions and the read-back are there for this reason: the crate's own map also recovers from a write that was
 //! cut short, but after repeated cuts a write that it reported as done can be missing at the next start (its issue
@@ -21,9 +22,11 @@ use core::future::Future;
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embedded_storage::nor_flash::NorFlash;
 use haptic_core::service::stored::{self, BYTES, Set, Stored};
+use haptic_diag::security::{BENCH_KEY, Key};
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
@@ -33,6 +36,8 @@ const PAGES: u32 = 2;
 const KEY: u8 = 0;
 /// Key and block, rounded up to the words of any flash.
 const BUFFER: usize = (1 + BYTES).next_multiple_of(32);
+
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// What was found in the flash.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -81,6 +86,30 @@ pub fn save<F: NorFlash>(
         write(flash, copy, &bytes)?;
     }
     Ok(())
+}
+
+/// The key for security access: its bytes and their CRC-32, little-endian, at the beginning of the page before the copies, written
+/// with the image where the ECU is made and never here. An image for the bench has one that everybody knows if there is none.
+pub fn key<F: NorFlash>(flash: &mut F) -> Option<Key> {
+    const BENCH: Option<Key> = if cfg!(feature = "bench") {
+        Some(BENCH_KEY)
+    } else {
+        None
+    };
+    let pages = (2 * PAGES + 1) * F::ERASE_SIZE as u32;
+    // Read in whole words of any flash.
+    let mut bytes = [0; 32];
+    let place = (flash.capacity() as u32).checked_sub(pages);
+    if place.is_none_or(|place| flash.read(place, &mut bytes).is_err()) {
+        return BENCH;
+    }
+    let (key, rest) = bytes.split_first_chunk::<16>()?;
+    let crc = rest.first_chunk().copied().map(u32::from_le_bytes);
+    if crc == Some(CRC.checksum(key)) {
+        Some(*key)
+    } else {
+        BENCH
+    }
 }
 
 /// Rewrites the copy that is not in use from the one in use, if they differ. The copy in use is not touched.

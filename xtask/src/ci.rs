@@ -19,8 +19,8 @@ use crate::built::Built;
 use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, SHAPE, cargo, command, root, run};
 use crate::{
-    bench, bindings_agree, boards, by_hand, c_library, coverage, evidence, fmu, gate, logs, mutants, policy,
-    profiles, python, trace, venv, web, wheel,
+    bench, bindings_agree, boards, by_hand, c_library, coverage, diagnosis, evidence, fmu, gate, logs,
+    mutants, policy, profiles, python, trace, venv, web, wheel,
 };
 
 /// Which stages run.
@@ -82,6 +82,8 @@ const STAGES: &[Stage] = stages! {
     "images" Meanwhile "the images that tests start in QEMU": images;
     "recordings" Beside "files of other tools, read and written by these tools":
         || logs::check(Built::ForTests);
+    "diagnosis" Beside "a workshop's tester of other makers against the product in QEMU; its PDX file":
+        || diagnosis::check(Built::ForTests);
     "documentation" Beside "cargo doc without a warning": documentation;
     "fmu" Beside "the FMUs, judged by FMPy": || fmu::check(Built::ForTests);
     "c" Beside "the C library and its header, on the host and in QEMU": || c_library::check(Built::ForTests);
@@ -386,6 +388,9 @@ fn fuzz() -> Result<()> {
     run(cargo()
         .args(["test", "--release", "-p", "haptic-core", "fuzz::"])
         .env("HAPTIC_FUZZ_BYTES", "1000000000"))?;
+    run(cargo()
+        .args(["test", "--release", "-p", "haptic-diag", "noise"])
+        .env("HAPTIC_FUZZ_INPUTS", "100000000"))?;
     run(cargo()
         .args("test --release -p haptic-guidance --test fuzz_readers".split(' '))
         .env("HAPTIC_FUZZ_INPUTS", "1000000"))

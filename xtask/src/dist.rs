@@ -110,6 +110,12 @@ pub(crate) fn crates() -> Result<PathBuf> {
     Ok(home.join("registry/src"))
 }
 
+/// The commit that is built, for an image to say; a plus where the checkout has changes.
+pub(crate) fn commit() -> String {
+    let said = output(command("git").args(["describe", "--always", "--exclude=*", "--abbrev=12", "--dirty=+"]));
+    said.map_or("nobody said".to_owned(), |commit| commit.trim().to_owned())
+}
+
 /// Seconds since 1970 of the last commit; outside of git those of 1980, the first year of a zip archive.
 pub(crate) fn commit_time() -> Result<u64> {
     let said = output(command("git").args(["log", "-1", "--format=%ct"])).unwrap_or_default();

@@ -63,6 +63,7 @@ pub(crate) fn with_map(bin: &str, features: &str) -> Result<(PathBuf, String)> {
     let map = format!("target/{bin}-{}.map", features.replace(',', "-"));
     let mut command = command_of("rustc", bin, M4F, features);
     command
+        .env("HAPTIC_COMMIT", dist::commit())
         .args(remapped()?)
         .args(["--", "-C", &format!("link-arg=-Map={map}")]);
     let elf = elf_of(&mut command)?;

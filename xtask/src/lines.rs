@@ -9,15 +9,15 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 23] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
     ("bindings/python", 2_300),
     ("bindings/web", 600),
     ("core", 7_200),
+    ("core/diag", 1_500),
     ("examples", 200),
-    ("firmware", 2_700),
+    ("firmware", 2_800),
     ("firmware/lockstep", 200),
     ("host-sim", 2_750),
     ("host-sim/analysis", 9_100),
@@ -26,7 +26,7 @@ pub(crate) const BUDGETS: [(&str, usize); 23] = [
     ("host-sim/evidence", 5_900),
     ("host-sim/log", 5_600),
     ("host-sim/metrics", 600),
-    ("host-sim/pil", 1_900),
+    ("host-sim/pil", 2_100),
     ("host-sim/report", 5_500),
     ("host-sim/sim", 8_800),
     ("host-sim/vectorised", 2_800),

@@ -14,6 +14,7 @@ mod ci;
 mod claims;
 mod code;
 mod coverage;
+mod diagnosis;
 mod dist;
 mod evidence;
 mod fmu;

@@ -6,11 +6,13 @@ use anyhow::{Context, Result};
 
 use crate::tool::{command, root, run};
 
-/// What the tests of the package, its examples, and the peers of recordings and FMUs need.
-pub(crate) const PACKAGES: [&str; 18] = [
+/// What the tests of the package, its examples, and the peers of recordings, FMUs and diagnosis need.
+pub(crate) const PACKAGES: [&str; 23] = [
     "asammdf",
+    "can-isotp",
     "cantools",
     "commonroad-vehicle-models",
+    "cryptography",
     "distributed",
     "fmpy",
     "gymnasium>=1.1",
@@ -20,12 +22,15 @@ pub(crate) const PACKAGES: [&str; 18] = [
     "mypy",
     "nbclient",
     "numpy",
+    "odxtools",
     "pandas",
     "pyarrow",
+    "pyserial",
     "pytest",
     "python-can",
     "scipy",
     "tqdm",
+    "udsoncan",
 ];
 
 /// The interpreter of the environment that all checks share, made where it is not there.

@@ -358,6 +358,92 @@ fn frames_of_every_kind_are_read_where_they_stand() {
     );
 }
 
+/// A BLF file of one object 101: so many bytes that it says, those that it has, and where it says that other things begin.
+fn blf_of(id: u32, says: u8, bytes: &[u8], more: u8) -> Vec<u8> {
+    let mut body = vec![7, 15, says, 0];
+    body.extend(id.to_le_bytes());
+    body.extend([0, 0, 0, 0, 0, 0x30, 0, 0]);
+    body.resize(40, 0);
+    body[35] = more;
+    body.extend_from_slice(bytes);
+    let mut file = b"LOGG".to_vec();
+    file.push(144);
+    file.resize(144, 0);
+    file.extend(b"LOBJ\x20\0\x01\0");
+    file.extend((32 + body.len() as u32).to_le_bytes());
+    file.extend([101, 0, 0, 0, 2, 0, 0, 0]);
+    file.resize(file.len() + 12, 0);
+    file.extend(body);
+    file
+}
+
+/// Zeros at the end of a frame may be missing: python-can fills them up as Vector's library does (its issue 1905).
+#[test]
+fn an_object_that_ends_before_its_frame_is_filled_up() {
+    let short = blf_of(0x6A9, 64, &[0xFF; 48], 0);
+    let (frames, told) = log("x.blf", short).frames().unwrap();
+    let expected: Vec<u8> = [[0xFF; 48].as_slice(), &[0; 16]].concat();
+    assert_eq!((frames[0].id, &frames[0].data), (0x6A9, &expected));
+    let said = "1 frame mended: the object ends before the frame, whose other bytes are 0, in object 1";
+    assert_eq!(told.iter().map(Note::to_string).collect::<Vec<_>>(), [said]);
+    // What stands behind the bytes of a frame is none of them.
+    let more = blf_of(0x6A9, 12, &[1, 2, 3, 4, 9, 9, 9, 9, 9, 9, 9, 9], 32 + 40 + 4);
+    let (frames, _) = log("x.blf", more).frames().unwrap();
+    assert_eq!(frames[0].data, [1, 2, 3, 4, 0, 0, 0, 0, 0, 0, 0, 0]);
+    let whole = blf_of(0x6A9, 12, &[5; 12], 32 + 40 + 12);
+    let (frames, told) = log("x.blf", whole).frames().unwrap();
+    assert!(frames[0].data == [5; 12] && told.is_empty());
+    let error = log("x.blf", blf_of(0x444_4444, 8, &[0; 8], 0))
+        .frames()
+        .unwrap_err();
+    let said = "1 frame left out: an identifier above 7FF that has 11 bits, in object 1";
+    assert!(error.to_string().contains(said), "{error}");
+}
+
+/// A frame of more than 8 bytes, or of another rate, is none of classic CAN, whatever flags say.
+#[test]
+fn flags_of_an_asc_file_make_no_classic_frame_of_64_bytes() {
+    let wide = "01 ".repeat(64);
+    let asc = format!(
+        "base hex timestamps absolute\n 0.1 CANFD 1 Rx 25 0 0 f 64 {wide}133 11 0 46\n \
+         0.2 CANFD 1 Rx 25 1 0 2 2 01 02 133 11 0 46\n 0.3 CANFD 1 Rx 25 0 0 2 2 01 02 133 11 0 46\n"
+    );
+    let (frames, told) = log("x.asc", asc.into()).frames().unwrap();
+    let forms = frames
+        .iter()
+        .map(|frame| (frame.form.most_bytes(), frame.data.len()));
+    assert_eq!(forms.collect::<Vec<_>>(), [(64, 64), (64, 2), (8, 2)]);
+    let said = "2 frames guessed: CAN FD by its bytes or bits, and not by its flags, the first in line 2";
+    assert_eq!(told.iter().map(Note::to_string).collect::<Vec<_>>(), [said]);
+}
+
+/// Names that a tool cut to 32 characters: one number each, and none is lost.
+#[test]
+fn signals_of_one_name_in_a_message_are_told_apart() {
+    let dbc = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A\nBO_ 37 M: 8 A\n SG_ Lock : 0|8@1+ (1,0) [0|0] \"\" A\n \
+               SG_ Lock_2 : 8|8@1+ (1,0) [0|0] \"\" A\n SG_ Lock : 16|8@1+ (1,0) [0|0] \"\" A\n";
+    let text = "(0.0) can0 025#0A0B0C0000000000\n";
+    let found = dbc::channels(&log("x.log", text.into()), dbc.as_bytes(), None).unwrap();
+    for (name, value) in [("Lock_1", 10.0), ("Lock_2", 11.0), ("Lock_2_", 12.0)] {
+        assert_eq!(values(&found, name), [value], "{name}");
+    }
+    let said =
+        "2 channels (Lock to Lock_1, Lock to Lock_2_) converted: another signal of the message has its name";
+    assert_eq!(notes(&found), [said]);
+}
+
+/// A mistake in a DBC file is one sentence with its place.
+#[test]
+fn a_dbc_file_that_is_not_understood_is_refused_with_its_line() {
+    let dbc = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A\nBO_ 37 M: 8 A\nBA_DEF_ BO_ \"Send\" ENUM;\n";
+    let error = dbc::parse(dbc.as_bytes()).unwrap_err().to_string();
+    assert!(
+        error.starts_with("the DBC file is not understood: line 6, column "),
+        "{error}"
+    );
+    assert!(!error.contains('\n') && error.contains("expected"), "{error}");
+}
+
 /// python-can reads 1992 of 3000 frames. Cut at any other place the file is read as far as it goes, and says so.
 #[test]
 fn a_cut_file_is_read_to_the_cut() {

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use haptic_log::formats::{self, Contents, Format, Reading};
-use haptic_log::recording::{Recording, Term};
+use haptic_log::recording::{Group, Recording, Series, Term};
 
 fn read_timed(name: &str, time: Option<&str>) -> Result<Recording, String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -186,6 +186,114 @@ fn the_time_decides_which_vectors_of_matlab_are_channels() {
             .unwrap_err()
             .contains("its unit \"m\" is not known as one of s")
     );
+}
+
+/// Groups of one name whose channels have one name become names of their own; others keep theirs.
+#[test]
+fn groups_of_mdf_with_the_same_channels_are_told_apart() {
+    let series = |name: &str, value: f64| Series {
+        name: name.into(),
+        values: vec![value; 3],
+        ..Series::default()
+    };
+    let group = |name: &str, channels: Vec<Series>| Group {
+        name: name.into(),
+        ..Group::new(vec![0.0, 1.0, 2.0], channels)
+    };
+    let groups = vec![
+        group("", vec![series("a", 1.0), series("b", 1.5)]),
+        group("", vec![series("a", 2.0)]),
+        group("ECU", vec![series("a", 3.0)]),
+        group("ECU", vec![series("c", 4.0)]),
+    ];
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("x.mf4");
+    formats::write(&path, groups.into()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let found = of(formats::read_bytes(bytes, Format::Mdf4, Reading::default())).unwrap();
+    assert_eq!(names(&found), ["group_1.a", "b", "group_2.a", "ECU.a", "c"]);
+    for (name, value) in [("group_1.a", 1.0), ("group_2.a", 2.0), ("ECU.a", 3.0), ("c", 4.0)] {
+        assert_eq!(values(&found, name), [value; 3], "{name}");
+    }
+    // A table has every channel by a name of its own.
+    let text = String::from_utf8(formats::to_csv(found).unwrap()).unwrap();
+    assert!(
+        text.starts_with("time_s,group_1.a,b,group_2.a,ECU.a,c\n"),
+        "{text}"
+    );
+}
+
+/// MATLAB's own workspace of functions is a variable without a name.
+#[test]
+fn a_variable_of_matlab_without_a_name_is_counted() {
+    fn element(kind: u8, contents: &[u8]) -> Vec<u8> {
+        let mut bytes = vec![kind, 0, 0, 0];
+        bytes.extend((contents.len() as u32).to_le_bytes());
+        bytes.extend_from_slice(contents);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    }
+    let variable = |name: &str, values: [f64; 2]| {
+        let numbers: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let parts = [
+            element(6, &[6, 0, 0, 0, 0, 0, 0, 0]),
+            element(5, &[2, 0, 0, 0, 1, 0, 0, 0]),
+            element(1, name.as_bytes()),
+            element(9, &numbers),
+        ];
+        element(14, &parts.concat())
+    };
+    let mut file = vec![b' '; 124];
+    file.extend([0, 1, b'I', b'M']);
+    file.extend(variable("time_s", [0.0, 1.0]));
+    file.extend(variable("", [5.0, 6.0]));
+    file.extend(variable("torque", [7.0, 8.0]));
+    let found = of(formats::read_bytes(file, Format::Mat, Reading::default())).unwrap();
+    assert_eq!(names(&found), ["torque"]);
+    assert_eq!(values(&found, "torque"), [7.0, 8.0]);
+    assert_eq!(notes(&found), ["1 channel left out: without a name, in byte 208"]);
+}
+
+/// pandas reads whole numbers of more than 64 bits as texts, and with them the whole column.
+#[test]
+fn large_and_small_numbers_are_written_with_an_exponent() {
+    let numbers = [16_366_960_556_931_777_377.0, -1.9e218, 3e-300, 1e15, 0.1, -0.0];
+    let time_s = (0..6).map(f64::from).collect();
+    let series = Series {
+        name: "a".into(),
+        values: numbers.to_vec(),
+        ..Series::default()
+    };
+    let text = formats::to_csv(Recording::of(Group::new(time_s, vec![series]))).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    let written: Vec<&str> = text.lines().skip(1).map(|line| &line[2..]).collect();
+    let expected = [
+        "1.6366960556931777e19",
+        "-1.9e218",
+        "3e-300",
+        "1000000000000000",
+        "0.1",
+        "-0",
+    ];
+    assert_eq!(written, expected);
+    assert_eq!(values(&csv(&text).unwrap(), "a"), numbers);
+}
+
+/// Two columns of one name are no channel, for neither is known to be the one that is meant.
+#[test]
+fn a_column_that_is_there_twice_is_refused_where_it_is_asked_for() {
+    let found = csv("time_s,a,b,a\n0,1,2,3\n1,1,2,3\n").unwrap();
+    assert_eq!(
+        found.find("a").unwrap_err().to_string(),
+        "channel a is there twice"
+    );
+    assert_eq!(values(&found, "b"), [2.0, 2.0]);
+    assert_eq!(
+        formats::to_csv(found).unwrap_err().to_string(),
+        "channel a is there twice"
+    );
+    let twice = csv("time_s,a,time_s\n0,1,0\n1,1,1\n").unwrap_err();
+    assert_eq!(twice, "channel time_s is there twice");
 }
 
 #[test]

@@ -108,12 +108,12 @@ metrics! {
         "Wang et al. 2022, section 3.2 (against its 5 N.m limit)";
     limited_time_share, "Time at a limit", "1",
         "Share of time in which a limit held the guidance torque back; a mode that allows none (a fade, \
-         Standby) is no limit.",
+         Standby) is no limit. No value without guidance.",
         "ours";
     conflict_time_share, "Conflict", "1",
         "Share of time in which driver and guidance turn the wheel against each other: T_d and T_h of opposite \
          sign, both larger than a dead band of 0.005 N.m (the torque sensor's resolution: less has no sign). \
-         The probe is taken out of both first, as for reversals.",
+         The probe is taken out of both first, as for reversals. No value without guidance.",
         "Boink, van Paassen, Mulder and Abbink 2014, IEEE SMC; the dead band is ours";
     mean_abs_driver_torque_in_conflict_nm, "Driver torque in conflict", "N.m",
         "Mean of |T_d| over the time in conflict; no value without conflict.",

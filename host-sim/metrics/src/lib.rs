@@ -114,6 +114,9 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         .failure
         .map(|failure| recovery(&trace.samples[..range.end], &failure))
         .unwrap_or_default();
+    // Where no guidance ever was, none met a limit and none was in conflict: that is no share of zero.
+    let is_guided = trace.samples.iter().any(|s| s.guidance_torque_nm != 0.0);
+    let of_guidance = |share: f64| finite(share / count).filter(|_| is_guided);
     let angle_deg = without_probe(trace, circumstances.probe_hz, |s| s.wheel_angle_rad.to_degrees());
     let reversals_per_min = |kind| reversals_per_min(&angle_deg, trace.sample_rate_hz, range.clone(), kind);
 
@@ -135,8 +138,8 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         mean_abs_guidance_torque_nm: finite(guidance.mean_abs(count)),
         rms_guidance_torque_nm: finite(guidance.rms(count)),
         peak_guidance_torque_nm: finite(guidance.peak_abs()),
-        limited_time_share: finite(limited / count),
-        conflict_time_share: finite(in_conflict / count),
+        limited_time_share: of_guidance(limited),
+        conflict_time_share: of_guidance(in_conflict),
         mean_abs_driver_torque_in_conflict_nm: finite(driver_in_conflict.mean_abs(in_conflict)),
         guidance_authority: finite(guidance.sum_abs() / (guidance.sum_abs() + driver.sum_abs())),
         peak_lateral_error_after_failure_m: recovery.peak_lateral_error_m,

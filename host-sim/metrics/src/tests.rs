@@ -225,11 +225,20 @@ fn authority_is_zero_by_hand_one_by_machine_and_nothing_at_rest() {
 
 #[test]
 fn share_of_time_at_a_limit() {
-    let trace = drive(4.0, |t| Sample {
-        guidance_limited: t < 1.0,
-        ..Sample::default()
-    });
-    assert_near(measure(&trace, &ROAD).limited_time_share, 0.25, 1e-12);
+    let limited = |guidance_torque_nm| {
+        let trace = drive(4.0, |t| Sample {
+            guidance_limited: t < 1.0,
+            guidance_torque_nm,
+            ..Sample::default()
+        });
+        measure(&trace, &ROAD)
+    };
+    assert_near(limited(-0.1).limited_time_share, 0.25, 1e-12);
+    let without = limited(0.0);
+    assert_eq!(
+        (without.limited_time_share, without.conflict_time_share),
+        (None, None)
+    );
 }
 
 /// After a failure at 2 s: 0.5 m until 4 s, 0.1 m until 6 s, 0.3 m until 7 s, then 0.1 m.

@@ -13,7 +13,7 @@
 //! - `link`: frames as bytes.
 //! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
 //!   and may reach into its memory. - [`mod@bench`]: a bus that keeps the time of the wall. - [`parameters`]: a product's, over
-//!   the same adapters. - [`live`]: what goes over a bus.
+//!   the same adapters. - [`diagnosis`]: a workshop's tester. - [`live`]: what goes over a bus.
 //!
 //! ```
 //! use haptic_pil::{Channel, PilError};
@@ -32,6 +32,7 @@
 mod adapter;
 pub mod bench;
 pub mod comparator;
+pub mod diagnosis;
 mod gdb;
 pub mod image;
 mod link;

@@ -37,7 +37,7 @@ const ATTEMPTS: u32 = 10;
 pub struct Product {
     pub(super) port: Port,
     /// Somebody sends the vehicle's speed.
-    hears_speed: bool,
+    pub(super) hears_speed: bool,
 }
 
 impl Product {
@@ -128,7 +128,7 @@ impl Product {
     }
 
     /// What became of a set: the status that has it in use, or the last one and why not.
-    fn outcome(
+    pub(super) fn outcome(
         &mut self,
         before: &ParameterStatus,
     ) -> Result<Result<ParameterStatus, (ParameterStatus, String)>, PilError> {
@@ -147,7 +147,7 @@ impl Product {
     }
 
     /// Speeds of zero, for an ECU on a bench: nobody else sends any. Returns the counter of the next.
-    fn send_standstill(&mut self) -> Result<u8, PilError> {
+    pub(super) fn send_standstill(&mut self) -> Result<u8, PilError> {
         let mut counter = 0;
         for _ in 0..SPEEDS {
             self.port.send(&[standing(&mut counter)])?;
@@ -249,7 +249,7 @@ impl Product {
 }
 
 /// The next frame of a vehicle that stands.
-fn standing(counter: &mut u8) -> Frame {
+pub(super) fn standing(counter: &mut u8) -> Frame {
     let frame = Vehicle::default().encode(*counter);
     *counter = counter.wrapping_add(1);
     frame

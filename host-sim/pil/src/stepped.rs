@@ -30,6 +30,8 @@ pub struct Stepped {
     port: Option<u16>,
     /// Address and bytes of the controller.
     controller: (u32, u32),
+    cost: StepCost,
+    stack_bytes: u32,
 }
 
 impl Stepped {
@@ -39,6 +41,18 @@ impl Stepped {
     /// # Errors
     /// What is missing or fails on the way to a running image.
     pub fn start(memory: bool) -> Result<Self, PilError> {
+        Self::launch(memory, false)
+    }
+
+    /// Builds the image and starts it on a machine that counts instructions ([`Stepped::cost`]).
+    ///
+    /// # Errors
+    /// What is missing or fails on the way to a running image.
+    pub fn counting() -> Result<Self, PilError> {
+        Self::launch(false, true)
+    }
+
+    fn launch(memory: bool, count: bool) -> Result<Self, PilError> {
         Qemu::check()?;
         let elf = image::build(Machine::default())?;
         let controller = symbol(&elf)?;
@@ -49,10 +63,7 @@ impl Stepped {
             .transpose()
             .map_err(|e| PilError::Failed(format!("no port for the debugger's stub: {e}")))?
             .map(|address| address.port());
-        let extras = Extras {
-            count: false,
-            gdb: port,
-        };
+        let extras = Extras { count, gdb: port };
         let (qemu, input, output) = Qemu::start(Machine::default(), &elf, channel, extras)?;
         let mut stepped = Self {
             input: BufWriter::new(input),
@@ -60,6 +71,11 @@ impl Stepped {
             channel,
             port,
             controller,
+            cost: StepCost {
+                cycles: 0,
+                background_cycles: 0,
+            },
+            stack_bytes: 0,
         };
         if channel == Channel::Slcan {
             stepped.write(link::OPEN)?;
@@ -100,14 +116,28 @@ impl Stepped {
         let mut answer = Vec::new();
         loop {
             let frame = self.responses.frame()?;
-            if StepCost::decode(&frame).is_some() {
+            if let Some(cost) = StepCost::decode(&frame) {
                 self.responses.steps += 1;
+                self.cost = cost;
                 return Ok(answer);
             }
-            if StackUse::decode(&frame).is_none() {
-                answer.push(frame);
+            match StackUse::decode(&frame) {
+                Some(StackUse { bytes }) => self.stack_bytes = bytes,
+                None => answer.push(frame),
             }
         }
+    }
+
+    /// What the step of the last answer took; [`super::qemu::instructions`] counts it.
+    #[must_use]
+    pub const fn cost(&self) -> StepCost {
+        self.cost
+    }
+
+    /// Bytes of its stack that the target has used, by the last whole thousand of steps.
+    #[must_use]
+    pub const fn stack_bytes(&self) -> u32 {
+        self.stack_bytes
     }
 
     /// Bits of the controller's memory.

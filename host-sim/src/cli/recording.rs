@@ -137,7 +137,11 @@ impl ReadingArguments {
     /// What the frames of a recording of the bus mean.
     pub(super) fn dbc(&self) -> Result<Vec<u8>, BadInput> {
         match &self.dbc {
-            Some(path) => Ok(std::fs::read(path).map_err(in_file(path))?),
+            Some(path) => {
+                let bytes = std::fs::read(path).map_err(in_file(path))?;
+                formats::dbc::parse(&bytes).map_err(in_file(path))?;
+                Ok(bytes)
+            }
             None => Ok(HAPTIC_DBC.into()),
         }
     }

@@ -182,7 +182,30 @@ fn parameters_that_no_ecu_takes_and_a_bus_that_is_not_there_are_named() {
         "[guidance]\ntorque_limit_nm = 6\n",
     )
     .unwrap();
-    let cases: [(&[&str], &[&str]); 3] = [
+    let cases: [(&[&str], &[&str]); 8] = [
+        (
+            &["ecu", "diag", "read", "torque_limit", "--can", "can99"],
+            &["did you mean torque_limit_nm?", "ecu diag describe"],
+        ),
+        (
+            &["ecu", "diag", "write", "k_1=9", "--bench-key", "--can", "can99"],
+            &["k_1 = 9", "from 0 to 4 N.m"],
+        ),
+        (
+            &[
+                "ecu",
+                "diag",
+                "write",
+                "k_1=1",
+                "--key",
+                "strong.toml",
+                "--can",
+                "can99",
+            ],
+            &["strong.toml: ", "32 hexadecimal digits"],
+        ),
+        (&["ecu", "diag", "write", "k_1=1", "--can", "can99"], &["--key"]),
+        (&["ecu", "diag", "list", "--can", "can99"], &["can99"]),
         (
             &["ecu", "parameters", "strong.toml", "--can", "can99"],
             &["strong.toml: ", "torque_limit_nm = 6", "0.1", "5"],

@@ -24,10 +24,11 @@ use super::{documents, place, root, run};
 use crate::{EVIDENCE, built, program};
 
 /// What a reader waits for and a test does not.
-const SHORTER: [(&str, &str); 3] = [
+const SHORTER: [(&str, &str); 4] = [
     ("--seeds 20", "--seeds 1"),
     ("-- experiment --probe", "-- experiment --participant 3 --probe"),
     ("xtask reliance", "xtask reliance --participant 3 --seeds 1"),
+    ("xtask handover", "xtask handover --every 5"),
 ];
 
 /// A fenced block: its first line without the backticks, and its text.
@@ -147,7 +148,11 @@ fn run_line(line: &str, block: &Block, place: &Path, at: &str) -> String {
 
 /// Whether a command's help has the options that the line names.
 fn knows(arguments: &[&str], program: &mut Command, place: &Path, at: &str) -> bool {
-    let levels = if arguments.first() == Some(&"ecu") { 2 } else { 1 };
+    let levels = match arguments {
+        ["ecu", "diag", ..] => 3,
+        ["ecu", ..] => 2,
+        _ => 1,
+    };
     let command = arguments.iter().take(levels).filter(|w| !w.starts_with('-'));
     let (code, help, err) = run(program.args(command).arg("--help"), place, at);
     assert_eq!(code, Some(0), "{at}\n{err}");

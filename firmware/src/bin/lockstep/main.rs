@@ -33,9 +33,11 @@ mod target {
     use haptic_core::quantity::{Instant, Micros};
     use haptic_core::safety::faults::FaultSet;
     use haptic_core::service::rejections::Rejections;
-    use haptic_core::service::stored::{Set, Stored};
+    use haptic_core::service::stored::Stored;
+    use haptic_diag::security::BENCH_KEY;
+    use haptic_diag::trouble::{Cells, EMPTY};
     use haptic_firmware::boards::{Board, ThisBoard};
-    use haptic_firmware::service::Service;
+    use haptic_firmware::service::{Origin, Restart, Service};
     use haptic_firmware::stack;
     use haptic_firmware::storage::Found;
     use haptic_lockstep::SimTime;
@@ -98,6 +100,8 @@ mod target {
         steps: u32,
         rejected: u32,
         product: Option<Product>,
+        /// Codes of faults, which a product's restart leaves alone.
+        cells: Cells,
     }
 
     /// What a product says beside its ECU, in a run that asks for it. It is kept out of what is measured.
@@ -106,19 +110,24 @@ mod target {
         /// Since it started.
         steps: u32,
         rejected: Rejections,
-        /// A set that was taken in this step, which begins the next start.
-        new: Option<Set>,
+        /// What was asked for in this step, which begins the next start.
+        restart: Option<Restart>,
         /// Class C faults of the last step, which a restart does not end.
         latched: FaultSet,
     }
 
     impl Product {
-        fn new(found: Found, params: Params, boot: Boot) -> Self {
+        fn new(found: Found, params: Params, boot: Boot, cells: &Cells) -> Self {
+            let origin = Origin {
+                boot,
+                is_image_whole: true,
+                key: Some(BENCH_KEY),
+            };
             Self {
-                service: Service::new(found, Some(params), boot),
+                service: Service::new(found, Some(params), origin, cells),
                 steps: 0,
                 rejected: Rejections::NONE,
-                new: None,
+                restart: None,
                 latched: FaultSet::NONE,
             }
         }
@@ -130,15 +139,29 @@ mod target {
                     self.rejected.count(frame.id(), reason);
                 }
                 if let Some(set) = self.service.receive(frame, ecu, self.steps) {
-                    self.new = Some(set);
+                    self.restart = Some(Restart::With(set));
                 }
             }
         }
 
         #[inline(never)]
-        fn say(&mut self, command: &Command, can: &mut impl Can<Frame = Frame>) {
+        fn say(
+            &mut self,
+            command: &Command,
+            ecu: &Ecu,
+            cells: &mut Cells,
+            can: &mut impl Can<Frame = Frame>,
+        ) {
             let said = self.service.frames(command, &mut self.rejected, self.steps);
             said.iter().for_each(|frame| send(can, frame));
+            let asked = self
+                .service
+                .diagnose(cells, command, ecu, &self.rejected, self.steps);
+            self.restart = self.restart.take().or(asked);
+            if let Some(frame) = self.service.answer(self.steps) {
+                send(can, &frame);
+                self.service.answered(self.steps);
+            }
             self.steps = self.steps.wrapping_add(1);
             self.latched = command.faults.common(FaultSet::CRITICAL);
         }
@@ -151,6 +174,7 @@ mod target {
             steps: 0,
             rejected: 0,
             product: None,
+            cells: EMPTY,
         };
 
         fn take(&mut self, frame: Frame, ecu: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
@@ -168,7 +192,8 @@ mod target {
         /// A function of its own, for the same reason as [`begin`].
         #[inline(never)]
         fn be_product(&mut self, is_one: bool) {
-            self.product = is_one.then(|| Product::new(Found::default(), self.params, Boot::default()));
+            self.product =
+                is_one.then(|| Product::new(Found::default(), self.params, Boot::default(), &self.cells));
         }
 
         fn tick(&mut self, now: Instant, place: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
@@ -204,7 +229,7 @@ mod target {
                 send(can, frame);
             }
             if let Some(product) = &mut self.product {
-                product.say(&step.command, can);
+                product.say(&step.command, ecu, &mut self.cells, can);
             }
             if self.steps.is_multiple_of(STACK_TURN) {
                 let bytes = stack::used();
@@ -215,17 +240,21 @@ mod target {
                 background_cycles,
             };
             send(can, &cost.encode());
-            if self.product.as_ref().is_some_and(|product| product.new.is_some()) {
+            if self
+                .product
+                .as_ref()
+                .is_some_and(|product| product.restart.is_some())
+            {
                 self.restart(place, now);
             }
         }
 
-        /// A product stores a new set and starts with it. Here it is gone when the machine ends.
+        /// A product stores a new set and starts with it, or starts anew. Here it is gone when the machine ends.
         #[inline(never)]
         fn restart(&mut self, place: &mut Option<Ecu>, now: Instant) {
             let Some(Product {
                 service,
-                new: Some(set),
+                restart: Some(restart),
                 latched,
                 ..
             }) = self.product.take()
@@ -233,18 +262,25 @@ mod target {
                 return;
             };
             let last = service.found().stored;
-            let (copy, sequence) = last.map_or((0, 1), |last| (1 - last.copy, last.sequence.wrapping_add(1)));
             let boot = Boot {
                 reset: ResetCause::NewParameters,
                 recent_resets: 0,
                 latched,
             };
-            self.params = set.params;
+            let stored = match restart {
+                Restart::With(set) => {
+                    let (copy, sequence) =
+                        last.map_or((0, 1), |last| (1 - last.copy, last.sequence.wrapping_add(1)));
+                    self.params = set.params;
+                    Some(Stored { set, sequence, copy })
+                }
+                Restart::AsIs => last,
+            };
             let found = Found {
-                stored: Some(Stored { set, sequence, copy }),
+                stored,
                 ..Found::default()
             };
-            self.product = Some(Product::new(found, self.params, boot));
+            self.product = Some(Product::new(found, self.params, boot, &self.cells));
             let start = Start {
                 state: StartState::Boot(boot),
                 at: now,

@@ -4,7 +4,8 @@
 //! random-effects model, parameter by parameter: driver i has `theta_i ~ N(mean, spread^2)`, of which the fit of the
 //! drive says `theta_i` with its standard error. The spread is that of the largest restricted likelihood, its interval
 //! by the Q-profile (Viechtbauer, "Confidence intervals for the amount of heterogeneity in meta-analysis", 2007), the
-//! interval of the mean by Knapp and Hartung with Student's t, and each driver's value is the conditional mean: drawn
+//! interval of the mean by Knapp and Hartung with Student's t, modified so that it is never narrower than with equal drivers (their factor
+//! is at least 1; Roever, Knapp and Friede 2015), and each driver's value is the conditional mean: drawn
 //! towards the group the more, the less its own drive says.
 
 use std::f64::consts::SQRT_2;
@@ -61,8 +62,8 @@ pub fn differences(first: &Identification, second: &Identification) -> Vec<Diffe
     found
 }
 
-/// Probabilities of several tests, so that the least of them is wrongly below a level in no more than that share.
-fn holm(p: &[f64]) -> Vec<f64> {
+/// Probabilities of several tests, so that the least of them is wrongly below a level in no more than that share (Holm 1979).
+pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
     let (mut corrected, mut last) = (vec![1.0; p.len()], 0.0_f64);
@@ -155,7 +156,7 @@ impl RandomEffects {
         let freedom = (values.len() - 1) as f64;
         let variance = restricted_variance(values);
         let (mean, weight, q) = weighed(values, variance);
-        let error = (q / freedom / weight).sqrt();
+        let error = ((q / freedom).max(1.0) / weight).sqrt();
         let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
         let chi = ChiSquared::new(freedom).ok()?;
         // Q falls as the variance grows.
@@ -302,6 +303,12 @@ mod tests {
         let found = RandomEffects::from_values(&values).unwrap();
         assert_eq!(found.variance, 0.0);
         assert!((found.mean - 7.69).abs() < 0.01, "{found:?}");
+        // numpy and SciPy: Q is 0.672 times its freedom, which would narrow the interval; with a factor of 1 it is 7.686 -+ 2.3646 * 4.072.
+        let [low, high] = found.mean_interval_95;
+        assert!(
+            (low + 1.9429).abs() < 1e-3 && (high - 17.3142).abs() < 1e-3,
+            "{found:?}"
+        );
         assert!((found.shrunk(28.0, 15.0) - found.mean).abs() < 1e-12);
     }
 }

@@ -125,8 +125,14 @@ fn event<'t>(
     if flags & REMOTE != 0 {
         return Ok(Line::Other(Part::Frame, "remote frame"));
     }
-    if flags & FD == 0 {
+    if flags & FD == 0 && length <= Form::Classic.most_bytes() && !(switched == 1 || passive == "1") {
         frame.form = Form::Classic;
+    } else if flags & FD == 0 {
+        let (why, place) = (
+            "CAN FD by its bytes or bits, and not by its flags",
+            format_args!("line {}", frame.line),
+        );
+        notes.count(Fate::Guessed, Part::Frame, why, place);
     }
     Ok(Line::Frame)
 }

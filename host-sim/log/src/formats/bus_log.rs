@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -63,7 +63,7 @@ impl fmt::Debug for Watch {
 struct Watched<'a, R>(R, &'a Watch);
 
 impl<R: Read> Read for Watched<'_, R> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.0.read(buffer)?;
         (self.1.0)(read as u64);
         Ok(read)
@@ -121,6 +121,14 @@ impl BusLog {
     pub fn watched(mut self, watch: Watch) -> Self {
         self.watch = watch;
         self
+    }
+
+    /// What it says, with its file's name if it has one.
+    fn named(&self, error: &RecordingError) -> RecordingError {
+        match &self.input {
+            Input::File(path) => format!("{}: {error}", path.display()).into(),
+            _ => error.clone(),
+        }
     }
 
     /// Its size, in bytes; 0 if nobody knows.
@@ -204,32 +212,39 @@ impl BusLog {
 /// A format of channels, what the disk says; with the file. What the log says.
 pub fn write_frames(path: &Path, log: &BusLog) -> Result<(u64, Notes), RecordingError> {
     let format = Format::from_path(path)?;
-    let (mut count, mut notes) = (0, Notes::default());
-    let mut counted = |written: std::io::Result<()>| {
-        count += 1;
-        written.map_err(refuse)
+    let (mut count, mut is_full, mut unread) = (0, false, None);
+    let mut notes = Notes::default();
+    let mut all = |write: &mut dyn FnMut(&BusFrame) -> io::Result<()>| {
+        let read = log.each(&mut |frame: &BusFrame| {
+            count += 1;
+            write(frame).map_err(|e| {
+                is_full = true;
+                refuse(e)
+            })
+        });
+        // What the log says is not of the file that is written.
+        notes = read.inspect_err(|e| unread = Some(log.named(e)).filter(|_| !is_full))?;
+        Ok::<_, RecordingError>(())
     };
-    replaced(path, |out| match format {
+    let mut taken = Notes::default();
+    let written = replaced(path, |out| match format {
         Format::Asc => {
             let mut writer = asc::Writer::new(out);
-            notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
-            writer.numbers.tell(&mut notes);
+            all(&mut |frame| writer.frame(frame))?;
+            writer.numbers.tell(&mut taken);
             writer.finish().map_err(refuse)
         }
         Format::Blf => {
             let mut writer = blf::Writer::new(out).map_err(refuse)?;
-            notes = log.each(&mut |frame: &BusFrame| counted(writer.frame(frame)))?;
-            writer.numbers.tell(&mut notes);
+            all(&mut |frame| writer.frame(frame))?;
+            writer.numbers.tell(&mut taken);
             writer.finish().map_err(refuse)
         }
-        Format::Candump => {
-            let mut write =
-                |frame: &BusFrame| counted(candump::write_frame(out, &interface(&frame.bus), frame));
-            notes = log.each(&mut write)?;
-            Ok(())
-        }
+        Format::Candump => all(&mut |frame| candump::write_frame(out, &interface(&frame.bus), frame)),
         _ => Err("frames become channels by a DBC file first".into()),
-    })?;
+    });
+    unread.map_or(written, Err)?;
+    notes.append(taken);
     Ok((count, notes))
 }
 

@@ -173,9 +173,12 @@ pub(super) fn begin<W: Write>(out: W, channels: &[Series]) -> Result<TableWriter
     TableWriter::new(out, std::iter::once("time_s".to_owned()).chain(names)).map_err(refuse)
 }
 
+/// The shortest digits that are read back as this number. pandas takes whole numbers beyond 64 bits for texts: those and all
+/// other large or small ones have an exponent.
 pub(super) fn text(value: f64) -> String {
-    match value.is_nan() {
-        true => String::new(),
-        false => value.to_string(),
+    match value.abs() {
+        size if size.is_nan() => String::new(),
+        0.0 | 1e-5..1e16 => value.to_string(),
+        _ => format!("{value:e}"),
     }
 }

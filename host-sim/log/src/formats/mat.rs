@@ -7,7 +7,7 @@ use std::io::Write;
 
 use super::Table;
 use super::bytes::{Budget, Bytes};
-use crate::notes::Fate;
+use crate::notes::{Fate, Part};
 use crate::recording::{Group, RecordingError, Series, Term, refuse};
 use crate::units;
 
@@ -147,6 +147,7 @@ pub(super) fn read(file: &[u8], time: Option<&Term>) -> Result<Table, RecordingE
     let mut budget = Budget::new(file);
     let mut at = 128;
     while at + 8 <= file.len() as u64 {
+        let place = format!("byte {at}");
         let (kind, contents, next) = element(b, at)?;
         at = next;
         let unpacked;
@@ -162,6 +163,10 @@ pub(super) fn read(file: &[u8], time: Option<&Term>) -> Result<Table, RecordingE
             _ => continue,
         };
         match matrix(contents, 0)? {
+            (name, _) if name.is_empty() => {
+                let (fate, part) = (Fate::LeftOut, Part::Channel);
+                found.notes.count(fate, part, "without a name", place);
+            }
             (name, Value::Numbers(values)) => {
                 budget.take(values.len())?;
                 columns.push(Series {

@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 
 use super::bytes::{Budget, Bytes, half};
-use super::{Reading, mdf_bus};
+use super::{Reading, mdf_bus, numbered};
 use crate::notes::{Fate, Notes, Part};
 use crate::recording::{Group, Recording, RecordingError, Series};
 use crate::units;
@@ -329,6 +329,7 @@ fn place(
     let why = match (channel_type, kind, bits) {
         _ if flags & 1 == 1 => Some("every value is invalid"),
         (3 | 6, ..) | (0 | 2, 0..=3, 1..=64) | (0 | 2, 4 | 5, 16 | 32 | 64) => None,
+        (1, 10..=12, _) => Some("bytes of varying length"),
         (1, ..) | (_, 6..=9, _) => Some("text"),
         (_, 10..=12, _) => Some("bytes"),
         (_, 13 | 14, _) => Some("date"),
@@ -587,11 +588,35 @@ pub(super) fn read(file: &[u8], reading: Reading<'_>) -> Result<Recording, Recor
         let aside = found.notes.aside();
         return Err(format!("there is no group of channels with a time{aside}").into());
     }
+    tell_apart(&mut groups);
     Ok(Recording {
         groups,
         unread: found.unread,
         notes: found.notes,
     })
+}
+
+/// Gives groups a name of their own that share name and channels with another: the name with the group's number.
+fn tell_apart(groups: &mut [Group]) {
+    let (mut first, mut shared) = (HashMap::new(), HashSet::new());
+    for (i, group) in groups.iter().enumerate() {
+        for channel in &group.channels {
+            let other = *first.entry((&group.name, &channel.name)).or_insert(i);
+            if other != i {
+                shared.extend([other, i]);
+            }
+        }
+    }
+    let mut taken: HashSet<String> = groups.iter().map(|group| group.name.clone()).collect();
+    for i in 0..groups.len() {
+        if shared.contains(&i) {
+            let stem = match groups[i].name.as_str() {
+                "" => "group",
+                name => name,
+            };
+            groups[i].name = numbered(stem, i + 1, &mut taken);
+        }
+    }
 }
 
 /// Every record to its group.

@@ -30,6 +30,7 @@ mod parquet;
 pub mod protection;
 mod write;
 
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -248,6 +249,15 @@ const NO_MCAP: &str = "this build writes no MCAP, which would make the first bui
 
 #[cfg(not(feature = "parquet"))]
 const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the command line host-sim does";
+
+/// A name with a number behind it, and what else it takes to be no other's.
+fn numbered(name: &str, number: usize, taken: &mut HashSet<String>) -> String {
+    let mut own = format!("{name}_{number}");
+    while !taken.insert(own.clone()) {
+        own.push('_');
+    }
+    own
+}
 
 /// Columns of a table, the time among them, as a recording.
 fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, RecordingError> {

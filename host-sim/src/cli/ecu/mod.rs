@@ -1,6 +1,7 @@
 //! `host-sim ecu COMMAND`: the ECU itself, in QEMU or on a board, and its bus.
 
 mod bus;
+mod diag;
 mod live;
 mod parameters;
 mod pil;
@@ -20,6 +21,8 @@ pub(super) enum Command {
     Live(live::Arguments),
     /// What parameters an ECU on a real bus uses; new ones for it to store
     Parameters(parameters::Arguments),
+    /// What a workshop's tester asks of an ECU: stored faults, readings, parameters (UDS)
+    Diag(diag::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
 }
@@ -30,6 +33,7 @@ pub(super) fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Pil(arguments) => pil::run(arguments),
         Command::Live(arguments) => live::run(arguments),
         Command::Parameters(arguments) => parameters::run(arguments),
+        Command::Diag(arguments) => diag::run(arguments),
         Command::Bus(arguments) => bus::run(arguments),
     }
 }

@@ -16,7 +16,8 @@
 //! spectrum of what the camera sees of it falls fast. A walk that is integrated once has a spectrum that falls more slowly:
 //! it leaves noise in the signal and takes the road's bends out of it, and both bias t_p and the gains. Intensity of the
 //! course and size of the noise are those of the largest likelihood. Innovations beyond [`GATE`] standard deviations are
-//! outliers: they get no part.
+//! outliers and get no part, if they exceed what a sample may be out of line by, too: in a signal with next to no noise the
+//! entry of every bend is beyond any number of standard deviations.
 //!
 //! A signal whose noise cannot matter ([`NEGLIGIBLE`]) is left as it is.
 
@@ -127,16 +128,16 @@ fn noise_of_differences(signal: &[f64], weight: &[f64]) -> f64 {
     *median / 0.674_5 / 20.0_f64.sqrt()
 }
 
-/// Smooths the place (`integrals` 2) or the angle (1) of the lane, with the vehicle's answer in it or without (`by_motion`). `weight` is the precision of each sample relative
-/// to the usual, zero where there is none; `floor` the least noise that rounding makes.
+/// Smooths the place (`integrals` 2) or the angle (1) of the lane, with the vehicle's answer in it or without (`by_motion`). `weight` is
+/// the precision of each sample relative to the usual, zero where there is none; `floor` is the least noise that rounding makes,
+/// `least` the least by which a sample is out of line.
 pub(crate) fn smooth(
     signal: &[f64],
     wheel_angle: &[f64],
     dt: f64,
-    integrals: usize,
-    by_motion: bool,
+    (integrals, by_motion): (usize, bool),
     weight: &[f64],
-    floor: f64,
+    [floor, least]: [f64; 2],
 ) -> Smoothed {
     let used = weight.iter().filter(|&&w| w > 0.0).count();
     let white = noise_of_differences(signal, weight).max(floor);
@@ -177,6 +178,7 @@ pub(crate) fn smooth(
         answers: answers.len(),
         dt,
         floor,
+        least,
         keep: negligible,
     };
     let best = problem.best(weight, None);
@@ -189,6 +191,7 @@ struct Problem {
     answers: usize,
     dt: f64,
     floor: f64,
+    least: f64,
     /// Whether the values are kept as they are, and only missing ones completed.
     keep: bool,
 }
@@ -243,8 +246,9 @@ impl Problem {
                 best = self.best(&weight, Some(best.exponent));
             }
             let before = outliers.len();
+            let gate = GATE.max(self.least / best.fit.noise_variance.sqrt());
             for (k, (w, v)) in weight.iter_mut().zip(&best.fit.innovations).enumerate() {
-                if *w > 0.0 && v.abs() > GATE {
+                if *w > 0.0 && v.abs() > gate {
                     *w = 0.0;
                     outliers.push(k);
                 }

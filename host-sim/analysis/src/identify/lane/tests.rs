@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::smooth;
 use super::trend::{COLUMNS, Filter, Row, factorial};
 
 /// The best linear estimate of a cubic with unknown coefficients plus an integrated walk under white noise, by dense
@@ -52,4 +53,29 @@ fn agrees_with_dense<const N: usize>(ratio: f64) {
 fn the_course_is_the_best_linear_estimate() {
     agrees_with_dense::<2>(0.7);
     agrees_with_dense::<4>(5.0);
+}
+
+/// A signal without noise, 20 s of 100 rows a second, that is level up to 10 s and rises by 0.02 a second from there; one sample is
+/// missing, and so many from 6 s on are off by 0.05.
+fn bend(off: usize) -> super::Smoothed {
+    let mut signal: Vec<f64> = (0..2000).map(|k| 2e-4 * f64::from((k - 1000).max(0))).collect();
+    signal[600..600 + off].iter_mut().for_each(|x| *x += 0.05);
+    let mut weight = vec![1.0; 2000];
+    weight[300] = 0.0;
+    smooth(&signal, &[0.0; 2000], 0.01, (1, false), &weight, [0.0, 5e-4])
+}
+
+#[test]
+fn the_entry_of_a_bend_is_not_out_of_line() {
+    let found = bend(0);
+    assert_eq!(found.noise.outliers, 0);
+    assert!(!found.bursts.contains(&true));
+    assert!(found.signal[300].abs() < 1e-6 && found.signal[1500] == 0.1);
+}
+
+#[test]
+fn a_burst_is_out_of_line_without_noise_too() {
+    let found = bend(4);
+    assert!((600..604).all(|k| found.bursts[k]));
+    assert!(!found.bursts[..590].contains(&true) && !found.bursts[1300..].contains(&true));
 }

@@ -206,9 +206,8 @@ fn smoothed_lane(
         &examined.signal,
         wheel_angle,
         dt,
-        2 - lane,
-        !options.plain_smoother,
+        (2 - lane, !options.plain_smoother),
         &examined.weight,
-        0.1 * examined.faults.step,
+        [0.1 * examined.faults.step, LEAST[lane]],
     )
 }

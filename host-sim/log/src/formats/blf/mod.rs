@@ -161,7 +161,17 @@ impl Stream {
             };
             self.frame.line += 1;
             match self.message(kind, Bytes(whole)) {
-                Ok(Found::Frame) => intake.frame(&self.frame)?,
+                Ok(Found::Frame { missing }) => {
+                    let (why, place) = (
+                        "the object ends before the frame, whose other bytes are 0",
+                        format_args!("object {}", self.frame.line),
+                    );
+                    let cut = u64::from(missing > 0);
+                    intake
+                        .notes
+                        .count_many(Fate::Mended, Part::Frame, why, cut, place);
+                    intake.frame(&self.frame)?;
+                }
                 Ok(Found::Other(part, why)) => intake.left_out(part, why, self.frame.line),
                 Err(_) => intake.left_out(Part::Object, "damaged", self.frame.line),
             }
@@ -179,6 +189,7 @@ impl Stream {
         }
         let body = u64::from(object.u16(4)?);
         let (channel, flags, code) = (object.u16(body), object.u8(body + 2), object.u8(body + 3));
+        let mut end = object.0.len();
         // Place and number of the bytes; bits of CAN FD, of the switched rate and of the sender's state.
         let (channel, flags, from, length, bits) = match kind {
             CAN_MESSAGE | CAN_MESSAGE_2 => (channel?, flags?, 8, code?.min(8), [false; 3]),
@@ -192,6 +203,9 @@ impl Stream {
                 let remote = if bits & 0x10 != 0 { REMOTE } else { 0 };
                 let flags = remote | u8::from(object.u8(body + 34)? != 0);
                 let bits = [0x1000, 0x2000, 0x4000].map(|bit| bits & bit != 0);
+                // Behind the bytes there may be more about the frame.
+                let more = usize::from(object.u8(body + 35)?);
+                end = if more == 0 { end } else { end.min(more) };
                 (object.u8(body)?.into(), flags, 40, object.u8(body + 2)?, bits)
             }
             _ => return Ok(Found::Other(Part::Object, "no frame of CAN")),
@@ -207,13 +221,23 @@ impl Stream {
         let id = object.u32(body + 4)?;
         (frame.id, frame.extended) = (id & 0x1FFF_FFFF, id & EXTENDED != 0);
         let length = usize::from(length);
-        if length > frame.form.most_bytes() || (frame.id > 0x7FF && !frame.extended) {
-            return Err("no frame".into());
+        if length > frame.form.most_bytes() {
+            return Ok(Found::Other(Part::Frame, "more bytes than a frame has"));
         }
+        if frame.id > 0x7FF && !frame.extended {
+            let why = "an identifier above 7FF that has 11 bits";
+            return Ok(Found::Other(Part::Frame, why));
+        }
+        // Writers leave out what the end of a frame has of zeros, as Vector's own library reads it.
+        let from = (body + from) as usize;
+        let bytes = object.0.get(from..end).ok_or("no place for bytes")?;
         frame.data.clear();
-        frame
-            .data
-            .extend_from_slice(object.slice(body + from, length as u64)?);
+        frame.data.extend(bytes.iter().take(length));
+        let missing = length - frame.data.len();
+        if missing > 0 && kind != FD_MESSAGE_64 {
+            return Err("the object ends before the frame".into());
+        }
+        frame.data.resize(length, 0);
         frame.sent = flags & SENT != 0;
         frame.bus.clear();
         // Writing to a string does not fail.
@@ -226,12 +250,15 @@ impl Stream {
         // Whole milliseconds and the rest apart: the sum is rounded once.
         let total_ns = u128::from(self.start_ms) * 1_000_000 + u128::from(ns);
         frame.time_s = total_ns as f64 / 1e9;
-        Ok(Found::Frame)
+        Ok(Found::Frame { missing })
     }
 }
 
 /// What an object is.
 enum Found {
-    Frame,
+    /// A data frame, and how many of its bytes the object does not have.
+    Frame {
+        missing: usize,
+    },
     Other(Part, &'static str),
 }

@@ -11,6 +11,7 @@ use can_dbc::{
     ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, SignalExtendedValueType, ValueType,
 };
 
+use super::numbered;
 use crate::notes::{Fate, Notes};
 use crate::recording::RecordingError;
 pub use signals::{Signals, channels};
@@ -78,8 +79,18 @@ pub fn parse(bytes: &[u8]) -> Result<(Dbc, Notes), RecordingError> {
         }
         before = if bare.is_empty() { before } else { bare };
     }
-    let mut dbc = Dbc::try_from(whole.as_str())
-        .map_err(|e| RecordingError(format!("the DBC file is not understood: {e}")))?;
+    let mut dbc = Dbc::try_from(whole.as_str()).map_err(|e| {
+        // Of a drawing of several lines: place and reason.
+        let said = e.to_string();
+        let lines: Vec<&str> = said.lines().map(str::trim).collect();
+        let place = lines.iter().find_map(|line| line.strip_prefix("--> "));
+        let place = place.map(|place| format!("line {}: ", place.replace(':', ", column ")));
+        let reason = lines.last().map_or("", |line| line.trim_start_matches("= "));
+        RecordingError(format!(
+            "the DBC file is not understood: {}{reason}",
+            place.unwrap_or_default()
+        ))
+    })?;
     let mut known = HashSet::new();
     dbc.messages.retain(|message| {
         let why = match message.id {
@@ -92,7 +103,28 @@ pub fn parse(bytes: &[u8]) -> Result<(Dbc, Notes), RecordingError> {
         }
         false
     });
+    dbc.messages
+        .iter_mut()
+        .for_each(|message| tell_apart(message, &mut notes));
     Ok((dbc, notes))
+}
+
+/// Gives signals of one name in one message a number each.
+fn tell_apart(message: &mut Message, notes: &mut Notes) {
+    let names: Vec<String> = message.signals.iter().map(|signal| signal.name.clone()).collect();
+    let mut taken: HashSet<String> = names.iter().cloned().collect();
+    if taken.len() == names.len() {
+        return;
+    }
+    for (i, name) in names.iter().enumerate() {
+        if names.iter().filter(|other| *other == name).count() > 1 {
+            let before = names[..i].iter().filter(|other| *other == name).count();
+            let own = numbered(name, before + 1, &mut taken);
+            let why = "another signal of the message has its name";
+            notes.channel(Fate::Converted, format!("{name} to {own}"), why);
+            message.signals[i].name = own;
+        }
+    }
 }
 
 /// The bits of a signal with its sign; none if the frame is too short.

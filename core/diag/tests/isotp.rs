@@ -1,0 +1,282 @@
+use crate::rig::inputs;
+use haptic_diag::isotp::{Bytes, Link};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+type Small = Link<40, 100>;
+
+/// What is due at a time, and it leaves.
+fn next<const R: usize, const S: usize>(link: &mut Link<R, S>, now_ms: u32) -> Option<Bytes> {
+    link.age(now_ms);
+    let frame = link.frame(now_ms);
+    if frame.is_some() {
+        link.sent(now_ms);
+    }
+    frame
+}
+
+#[test]
+fn a_single_frame_is_a_message_and_what_is_shorter_than_it_says_is_none() {
+    for length in 1..=7_u8 {
+        let mut link = Small::NEW;
+        let data: Vec<u8> = [length].into_iter().chain(1..=length).collect();
+        link.receive(&data[..data.len() - 1], 0);
+        assert_eq!(link.message(), None);
+        link.receive(&data, 0);
+        let message = link.message().unwrap();
+        assert_eq!((message.bytes, message.length), (&data[1..], u16::from(length)));
+        // The next is taken when this one is done with.
+        link.receive(&[1, 0xEE], 0);
+        assert_eq!(link.message().unwrap().bytes, &data[1..]);
+        link.done();
+        assert_eq!(link.message(), None);
+    }
+    let mut link = Small::NEW;
+    for nothing in [
+        &[][..],
+        &[0],
+        &[8, 1, 2, 3, 4, 5, 6, 7],
+        &[0xF0, 1],
+        &[0x40],
+        &[0x21, 1],
+    ] {
+        link.receive(nothing, 0);
+        assert_eq!((link.message(), link.frame(0)), (None, None), "{nothing:02X?}");
+    }
+}
+
+#[test]
+fn a_long_message_comes_in_blocks_of_eight() {
+    let mut link = Small::NEW;
+    let mut link_says = Vec::new();
+    let message: Vec<u8> = (0..150).collect();
+    link.receive(&[0x10, 150, 0, 1, 2, 3, 4, 5], 0);
+    for (number, part) in message[6..].chunks(7).enumerate() {
+        link_says.extend(next(&mut link, 0).map(|frame| (number, frame)));
+        let data: Vec<u8> = [0x20 | ((number as u8 + 1) & 0xF)]
+            .into_iter()
+            .chain(part.iter().copied())
+            .collect();
+        link.receive(&data, 0);
+    }
+    let go = [0x30, 8, 2, 0xCC, 0xCC, 0xCC, 0xCC, 0xCC];
+    assert_eq!(link_says, [(0, go), (8, go), (16, go)]);
+    // What has no place is counted.
+    let got = link.message().unwrap();
+    assert_eq!((got.bytes, got.length), (&message[..40], 150));
+}
+
+/// A consecutive frame is due within a second, in its number and whole; otherwise the message is none.
+#[test]
+fn what_does_not_go_on_in_order_and_time_is_no_message() {
+    let begin = |at| {
+        let mut link = Small::NEW;
+        link.receive(&[0x10, 12, 0, 1, 2, 3, 4, 5], at);
+        next(&mut link, at).unwrap();
+        link
+    };
+    let last = [0x21, 6, 7, 8, 9, 10, 11];
+    for (data, at, is_good) in [
+        (&last[..], 1000, true),
+        (&last[..], 1001, false),
+        (&[0x22, 6, 7, 8, 9, 10, 11][..], 1, false),
+        (&[0x20, 6, 7, 8, 9, 10, 11][..], 1, false),
+        (&last[..6], 1, false),
+    ] {
+        // Also where the clock wraps.
+        for start in [0, u32::MAX - 500] {
+            let mut link = begin(start);
+            link.receive(data, start.wrapping_add(at));
+            assert_eq!(link.message().is_some(), is_good, "{data:02X?} after {at} ms");
+            link.receive(&last, start.wrapping_add(at));
+            assert_eq!(link.message().is_some(), is_good);
+        }
+    }
+    let mut link = begin(0);
+    link.age(1001);
+    link.receive(&last, 1001);
+    assert_eq!(link.message(), None, "given up");
+    // A new beginning ends the old one.
+    for beginning in [&[2, 0xAA, 0xBB][..], &[0x10, 12, 20, 21, 22, 23, 24, 25]] {
+        let mut link = begin(0);
+        link.receive(beginning, 1);
+        link.receive(&last, 2);
+        let first = link.message().unwrap().bytes[0];
+        assert_eq!(first, beginning[if beginning.len() == 3 { 1 } else { 2 }]);
+    }
+}
+
+#[test]
+fn a_length_beyond_4095_is_refused_and_one_that_is_a_single_frames_is_ignored() {
+    let mut link = Small::NEW;
+    link.receive(&[0x10, 0, 0, 1, 0, 0, 1, 2], 0);
+    assert_eq!(next(&mut link, 0).unwrap()[0], 0x32);
+    for length in 1..=7 {
+        link.receive(&[0x10, length, 1, 2, 3, 4, 5, 6], 0);
+        assert_eq!(next(&mut link, 0), None);
+    }
+    link.receive(&[0x10, 8, 1, 2, 3, 4, 5], 0);
+    assert_eq!(next(&mut link, 0), None, "a first frame is full");
+}
+
+fn sending() -> (Small, Vec<u8>) {
+    let mut link = Small::NEW;
+    let message: Vec<u8> = (100..200).collect();
+    assert!(link.send(&message));
+    assert_eq!(
+        next(&mut link, 0),
+        Some([0x10, 100, 100, 101, 102, 103, 104, 105])
+    );
+    assert_eq!(next(&mut link, 0), None, "flow control is due");
+    (link, message)
+}
+
+#[test]
+fn what_is_sent_keeps_the_separation_and_the_blocks_that_the_peer_asks_for() {
+    // The separation's codes of table 20, and what they mean in ms; reserved ones are the longest.
+    for (code, ms) in [
+        (0, 0),
+        (5, 5),
+        (0x7F, 127),
+        (0xF1, 1),
+        (0xF9, 1),
+        (0x80, 127),
+        (0xFA, 127),
+    ] {
+        for block in [0, 3] {
+            let (mut link, message) = sending();
+            let mut got = message[..6].to_vec();
+            let (mut now, mut in_block, mut number) = (10_u32, 0, 1);
+            link.receive(&[0x30, block, code], now);
+            while got.len() < message.len() {
+                if block > 0 && in_block == block {
+                    assert_eq!(next(&mut link, now + 500), None, "flow control is due");
+                    (now, in_block) = (now + 500, 0);
+                    link.receive(&[0x30, block, code], now);
+                }
+                if in_block > 0 && ms > 0 {
+                    assert_eq!(next(&mut link, now + ms - 1), None, "code {code:02X}: too early");
+                    now += ms;
+                }
+                let frame = next(&mut link, now).unwrap();
+                assert_eq!(frame[0], 0x20 | (number & 0xF));
+                got.extend(&frame[1..]);
+                (in_block, number) = (in_block + 1, number + 1);
+            }
+            assert_eq!(got[..100], message);
+            assert!(!link.is_sending() && got[100..].iter().all(|byte| *byte == 0xCC));
+        }
+    }
+}
+
+#[test]
+fn a_peer_that_is_silent_waits_for_ever_or_has_no_room_is_given_up() {
+    let (mut link, _) = sending();
+    link.age(1000);
+    assert!(link.is_sending());
+    link.age(1001);
+    assert!(!link.is_sending(), "silent");
+    for (status, name) in [(2, "no room"), (3, "reserved"), (15, "reserved")] {
+        let (mut link, _) = sending();
+        link.receive(&[0x30 | status, 0, 0], 1);
+        assert!(!link.is_sending(), "{name}");
+    }
+    let (mut link, _) = sending();
+    for wait in 1..=10 {
+        link.receive(&[0x31, 0, 0], wait * 900);
+        link.age(wait * 900 + 900);
+        assert!(link.is_sending(), "{wait} waits");
+    }
+    link.receive(&[0x31, 0, 0], 9901);
+    assert!(!link.is_sending(), "waits for ever");
+    // Flow control that is too short, or that nobody asked for, is none.
+    let (mut link, _) = sending();
+    link.receive(&[0x30, 0], 1);
+    assert_eq!(next(&mut link, 1), None);
+    let mut idle = Small::NEW;
+    idle.receive(&[0x30, 0, 0], 1);
+    assert_eq!(next(&mut idle, 1), None);
+}
+
+#[test]
+fn a_message_without_a_place_is_not_begun() {
+    let mut link = Small::NEW;
+    assert!(!link.send(&[]) && !link.send(&[0; 101]) && !link.is_sending());
+    assert_eq!(link.frame(0), None);
+}
+
+/// Two ends, and a bus that now and then loses a frame: what arrives is what was sent, or nothing.
+#[test]
+fn two_ends_on_a_bus_that_loses_frames_tell_nothing_false() {
+    let mut random = SmallRng::seed_from_u64(47);
+    let (mut whole, mut lost) = (0, 0);
+    for round in 0..2000_u32 {
+        let (mut one, mut other) = (Link::<200, 200>::NEW, Link::<200, 200>::NEW);
+        let length = random.random_range(1..=200);
+        let message: Vec<u8> = (0..length).map(|_| random.random()).collect();
+        assert!(one.send(&message));
+        let loss = if round % 2 == 0 { 0.0 } else { 0.05 };
+        let mut is_lost = false;
+        for now in 0..3000 {
+            for is_forth in [true, false] {
+                let (from, to) = if is_forth {
+                    (&mut one, &mut other)
+                } else {
+                    (&mut other, &mut one)
+                };
+                if let Some(frame) = next(from, now) {
+                    if random.random_bool(loss) {
+                        is_lost = true;
+                    } else {
+                        to.receive(&frame, now);
+                    }
+                }
+            }
+            if !one.is_sending() && other.message().is_some() {
+                break;
+            }
+        }
+        match other.message() {
+            Some(got) => {
+                assert_eq!(
+                    (got.bytes, usize::from(got.length)),
+                    (&message[..], message.len())
+                );
+                whole += 1;
+            }
+            None => {
+                assert!(is_lost);
+                lost += 1;
+            }
+        }
+        assert!(!one.is_sending(), "given up or done");
+    }
+    assert!(whole >= 1000 && lost > 100, "{whole} whole, {lost} lost");
+}
+
+/// Anything at all: no panic, no message longer than it says, and at most a frame for each that came, but flow control.
+#[test]
+fn noise_makes_no_panic() {
+    let mut random = SmallRng::seed_from_u64(4747);
+    let mut link = Small::NEW;
+    let mut now = u32::MAX - 100_000;
+    let mut messages = 0;
+    for _ in 0..inputs(300_000) {
+        let mut data: Vec<u8> = (0..random.random_range(0..=8)).map(|_| random.random()).collect();
+        if let (Some(head), true) = (data.first_mut(), random.random_bool(0.7)) {
+            *head &= 0x33;
+        }
+        link.receive(&data, now);
+        now = now.wrapping_add(random.random_range(0..3));
+        if random.random_bool(0.1) {
+            link.send(&data);
+        }
+        next(&mut link, now);
+        if let Some(message) = link.message() {
+            assert!(message.bytes.len() <= 40 && message.bytes.len() <= usize::from(message.length));
+            messages += 1;
+            link.done();
+        }
+    }
+    assert!(messages > 1000, "{messages}");
+}

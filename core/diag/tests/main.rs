@@ -1,0 +1,8 @@
+//! Diagnosis, judged by the standards' own numbers: the tester here writes and reads its frames by hand.
+
+mod isotp;
+mod lengths;
+mod rig;
+mod security;
+mod server;
+mod writing;
