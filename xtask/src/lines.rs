@@ -9,6 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
+pub(crate) const BUDGETS: [(&str, usize); 24] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -19,19 +20,19 @@ use std::{fs, io};
     ("examples", 200),
     ("firmware", 2_800),
     ("firmware/lockstep", 200),
-    ("host-sim", 2_750),
+    ("host-sim", 3_100),
     ("host-sim/analysis", 9_100),
     ("host-sim/batch", 8_800),
     ("host-sim/campaign", 4_000),
     ("host-sim/evidence", 5_900),
-    ("host-sim/log", 5_600),
+    ("host-sim/log", 5_700),
     ("host-sim/metrics", 600),
-    ("host-sim/pil", 2_100),
+    ("host-sim/pil", 2_200),
     ("host-sim/report", 5_500),
     ("host-sim/sim", 8_800),
     ("host-sim/vectorised", 2_800),
     ("host-sim/vehicle", 1_700),
-    ("xtask", 6_500),
+    ("xtask", 6_600),
     ("xtask/log", 100),
 ];
 
