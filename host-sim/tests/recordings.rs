@@ -297,6 +297,7 @@ fn what_is_mistyped_or_empty_is_answered_with_what_is_meant() {
     write("field.toml", "[driver]\nk_gh = 0.3\n");
     write("both.toml", "speed_kmh = 60\nspeed_m_per_s = 16\n");
     write("empty", "");
+    write("x.csv", "time_s\n0\n");
     for (arguments, says) in [
         (&["run", "condition.toml"][..], "did you mean high?"),
         (&["run", "table.toml"], "did you mean driver?"),
@@ -314,6 +315,27 @@ fn what_is_mistyped_or_empty_is_answered_with_what_is_meant() {
             "did you mean driver-torque-frozen?",
         ),
         (&["faults", "--world", "breaking"], "did you mean braking?"),
+        (&["identify", "x.csv", "--fix", "k_gh=1"], "did you mean k_hg?"),
+        (
+            &["identify", "x.csv", "--estimate", "t_nm"],
+            "did you mean t_nms?",
+        ),
+        (
+            &["identify", "x.csv", "--layout", "openpilt"],
+            "did you mean openpilot?",
+        ),
+        (
+            &["identify", "x.csv", "--map", "e_theta=Heading"],
+            "did you mean e_theta_rad?",
+        ),
+        (
+            &["validate", "--corruptions", "1", "--only", "lane nois"],
+            "did you mean lane noise",
+        ),
+        (
+            &["validate", "--changes", "1", "--only", "K_d stps by half"],
+            "did you mean K_d steps by half?",
+        ),
     ] {
         let output = host_sim(directory.path(), arguments);
         let said = String::from_utf8_lossy(&output.stderr);

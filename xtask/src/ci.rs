@@ -94,6 +94,8 @@ const STAGES: &[Stage] = stages! {
     "dependencies" Beside "licences, bans and sources of dependencies": policy::dependencies;
     "workflows" Beside "the workflows of hosted CI": policy::workflows;
     "evidence-stale" Full "no figure is older than the code that it judges": evidence::stale;
+    "published" Full "test files of python-can, cantools, asammdf, SciPy, pyarrow and canmatrix":
+        || logs::published(Built::ForTests);
     "all-boards" Full "the same of all boards, the real ones' images among them":
         || boards::check(boards::Scope::All, Built::ForTests, false);
     "wheel" Full "the wheel as it is handed on, installed and tested":

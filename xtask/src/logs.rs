@@ -11,6 +11,12 @@ const DRIVE: &str = "tests/data/driver-logs/guided-passive.csv";
 /// Rows of a whole run: enough for every message, and seconds instead of minutes in Python.
 const ROWS: usize = 4000;
 const FRAMES: usize = 40_000;
+/// Packages whose sources hold test files; those of SciPy, pyarrow and canmatrix lie where they are installed.
+const PUBLISHED: [(&str, &str); 3] = [
+    ("python-can", "4.6.1"),
+    ("cantools", "45.1.0"),
+    ("asammdf", "8.8.28"),
+];
 
 /// Writes with one side and reads with the other, both ways.
 pub(crate) fn check(built: Built) -> Result<()> {
@@ -37,4 +43,33 @@ pub(crate) fn check(built: Built) -> Result<()> {
         .arg("host-sim/log/peers/check.py")
         .args([&host_sim, &place, &csv, &bus])
         .arg(DRIVE))
+}
+
+/// Reads the test files that other projects publish, with `host-sim convert` and with these projects' own packages.
+pub(crate) fn published(built: Built) -> Result<()> {
+    let place = root().join("target/published");
+    std::fs::create_dir_all(&place)?;
+    let python = venv::environment()?;
+    for (name, version) in PUBLISHED {
+        let unpacked = place.join(format!("{}-{version}", name.replace('-', "_")));
+        if !unpacked.exists() {
+            let pip = [
+                "-m",
+                "pip",
+                "download",
+                "-q",
+                "--disable-pip-version-check",
+                "--no-deps",
+            ];
+            run(command(&python.to_string_lossy())
+                .args(pip)
+                .args(["--no-binary", name, &format!("{name}=={version}"), "-d"])
+                .arg(&place))?;
+            let archive = unpacked.with_added_extension("tar.gz");
+            run(command("tar").arg("xzf").arg(archive).arg("-C").arg(&place))?;
+        }
+    }
+    run(command(&python.to_string_lossy())
+        .arg("host-sim/log/peers/published.py")
+        .args([&built.host_sim()?, &place]))
 }

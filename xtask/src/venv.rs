@@ -7,9 +7,10 @@ use anyhow::{Context, Result};
 use crate::tool::{command, root, run};
 
 /// What the tests of the package, its examples, and the peers of recordings, FMUs and diagnosis need.
-pub(crate) const PACKAGES: [&str; 23] = [
+pub(crate) const PACKAGES: [&str; 24] = [
     "asammdf",
     "can-isotp",
+    "canmatrix",
     "cantools",
     "commonroad-vehicle-models",
     "cryptography",

@@ -32,6 +32,7 @@ mod event;
 pub mod formats;
 #[cfg(feature = "parquet")]
 pub mod guard;
+pub mod near;
 pub mod notes;
 pub mod recording;
 pub mod table;

@@ -39,7 +39,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use haptic_sim::input::did_you_mean;
+use haptic_log::near::did_you_mean;
 use serde::Serialize;
 
 pub use names::signed;
@@ -192,7 +192,10 @@ pub fn status(result: Result<Outcome, BadInput>) -> ExitCode {
         Ok(Outcome::Failed) => ExitCode::from(1),
         Ok(Outcome::Interrupted) => ExitCode::from(INTERRUPTED),
         Err(BadInput(message)) => {
-            eprintln!("error: {message}");
+            let words: Vec<String> = std::env::args_os()
+                .map(|word| word.to_string_lossy().into_owned())
+                .collect();
+            eprintln!("error: {}", names::as_written(message, &words));
             ExitCode::from(2)
         }
     }

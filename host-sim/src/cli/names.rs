@@ -45,6 +45,33 @@ pub fn signed(command: clap::Command) -> clap::Command {
     })
 }
 
+/// A sentence with its numbers as they were written, in options (`--rate 1e9`) and in fields of the files among the words.
+pub(super) fn as_written(mut sentence: String, words: &[String]) -> String {
+    let files = words.iter().filter(|word| word.ends_with(".toml"));
+    let files: Vec<String> = files
+        .filter_map(|file| std::fs::read_to_string(file).ok())
+        .collect();
+    let fields = files
+        .iter()
+        .flat_map(|text| text.split(['\n', ',', '{', '}', '#']));
+    let pairs = words.iter().map(String::as_str).chain(fields);
+    let pairs = pairs.filter_map(|pair| pair.split_once('='));
+    let options = words.windows(2).map(|pair| (&pair[0][..], &pair[1][..]));
+    for (name, text) in pairs.chain(options) {
+        let (name, text) = (name.trim(), text.trim());
+        if let Ok(value) = text.replace('_', "").parse::<f64>()
+            && value.is_finite()
+            && !name.is_empty()
+        {
+            for (sign, end) in [(" = ", " "), (" ", ":")] {
+                let said = format!("{name}{sign}{value}{end}");
+                sentence = sentence.replace(&said, &format!("{name}{sign}{text}{end}"));
+            }
+        }
+    }
+    sentence
+}
+
 /// The sentence for a command of the ECU without `ecu`, or for an option of the evaluation without its command.
 pub(super) fn explain(error: &clap::Error, arguments: &[OsString]) -> Option<String> {
     let kind = match error.kind() {

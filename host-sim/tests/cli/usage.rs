@@ -13,12 +13,14 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("manual.toml", "condition = 'manual'\n");
     write("exact.toml", "sensors = 'exact'\n");
     write("late.toml", "[failure]\nkind = 'torque'\ntime_s = 5000\n");
+    write("exponent.toml", "[driver]\nt_p_s = 1e1 # late\n");
+    write("inline.toml", "driver = { k_hg = 1, t_p_s = 1_0.0 }\n");
     write("between.toml", "[guidance]\nlaw = 1.5\n");
     write("empty.toml", "");
     write("course.toml", "[[segment]]\nlength_m = 500\n");
     write("on-a-tight-road.toml", "course = 'tight.toml'\n");
     write("notes.txt", "of somebody");
-    let cases: [(&[&str], &str); 31] = [
+    let cases: [(&[&str], &str); 35] = [
         (
             &["run", "on-a-tight-road.toml"],
             "on-a-tight-road.toml: course: tight.toml: ",
@@ -71,6 +73,17 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
             "--window from = 3340 m",
         ),
         (&["evaluate", "--speed", "nan"], "speed = NaN"),
+        // Numbers are shown as they were written.
+        (
+            &["evaluate", "--speed", "5e0"],
+            "--speed = 5e0 km/h is outside 20 to 250 km/h",
+        ),
+        (&["convert", "a.csv", "b.csv", "--rate=1e9"], "--rate 1e9: 0.1 to"),
+        (
+            &["run", "exponent.toml"],
+            "exponent.toml: driver.t_p_s = 1e1 s is outside 0.001 to 2 s",
+        ),
+        (&["run", "inline.toml"], "driver.t_p_s = 1_0.0 s is outside"),
         (&["evaluate", "--window", "500", "100"], "window"),
         (
             &["evaluate", "--window", "100", "9000"],

@@ -1,5 +1,7 @@
 //! What the caller knows already: parameters given instead of estimated (`--fix NAME=VALUE`).
 
+use haptic_log::near::did_you_mean;
+
 use super::noise_model::BEND_RAD_S;
 use super::signals::Muscle;
 
@@ -152,8 +154,9 @@ impl Options {
         let Some(&(name, low, high)) = FIXABLE.iter().find(|(n, ..)| *n == name) else {
             let names: Vec<&str> = FIXABLE.iter().map(|f| f.0).collect();
             return Err(FixError(format!(
-                "--fix {name}: unknown, one of {} is wanted",
-                names.join(", ")
+                "--fix {name}: unknown, one of {} is wanted{}",
+                names.join(", "),
+                did_you_mean(&name, names)
             )));
         };
         let value: f64 = text
@@ -197,7 +200,8 @@ impl Options {
         let name = name.trim().to_ascii_lowercase();
         let Some(i) = ESTIMABLE.iter().position(|e| e.0 == name) else {
             let names: Vec<&str> = ESTIMABLE.iter().map(|e| e.0).collect();
-            return refuse(format!("unknown, one of {} is wanted", names.join(", ")));
+            let near = did_you_mean(&name, names.iter().copied());
+            return refuse(format!("unknown, one of {} is wanted{near}", names.join(", ")));
         };
         let (_, least, most) = ESTIMABLE[i];
         let [low, high] = match range {

@@ -7,8 +7,8 @@ use haptic_campaign::drivers::Drivers;
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, document, target};
 use haptic_core::controller::params::LAWS;
+use haptic_log::near::did_you_mean;
 use haptic_report::document::write_bytes;
-use haptic_sim::input::did_you_mean;
 use haptic_sim::worlds::WORLDS;
 
 use host_sim::cli::results::ResultArguments;

@@ -5,6 +5,7 @@ use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
 use haptic_evidence::estimates::{POPULATION, changes, corruptions, methods, recordings, repeat};
 use haptic_evidence::vehicle::coverage;
+use haptic_log::near::did_you_mean;
 
 use host_sim::cli::participants::Drives;
 use host_sim::cli::results::ResultArguments;
@@ -41,7 +42,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["participant", "probe"])]
     vehicles: Option<u32>,
     /// Only those of --corruptions and --changes whose name holds this
-    #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings"])]
+    #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings", "vehicles"])]
     only: String,
     #[command(flatten)]
     drives: Drives,
@@ -54,7 +55,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let is_asked = |name: &str| name.contains(&arguments.only);
     if !POPULATION.iter().any(|(name, _)| is_asked(name)) && arguments.changes.is_none() {
         let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
-        return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
+        let near = did_you_mean(&arguments.only, names.iter().copied());
+        return Err(format!("--only {:?}: none of {}{near}", arguments.only, names.join("; ")).into());
     }
     let output = arguments.results.begin("validate")?;
     let questions = [

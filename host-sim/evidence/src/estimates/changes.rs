@@ -8,6 +8,7 @@
 use haptic_analysis::identify::{
     Change, DriveLog, Identification, Options, Pieces, identify_in_pieces, identify_with_noise_model,
 };
+use haptic_log::near::did_you_mean;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 use serde::Serialize;
@@ -77,8 +78,11 @@ pub fn changes(
 ) -> Result<Changes, StudyError> {
     let kinds: Vec<_> = KINDS.iter().filter(|(name, _)| name.contains(only)).collect();
     if kinds.is_empty() {
-        let names = KINDS.map(|k| k.0).join("; ");
-        return Err(StudyError::Asked(format!("--only {only:?}: none of {names}")));
+        let names = KINDS.map(|k| k.0);
+        let (near, names) = (did_you_mean(only, names), names.join("; "));
+        return Err(StudyError::Asked(format!(
+            "--only {only:?}: none of {names}{near}"
+        )));
     }
     let jobs = guided(plan, drives)?;
     let found = each(&jobs, watch, |&(number, published, drive)| {

@@ -86,6 +86,8 @@ pub struct DriveLog {
 
 /// Rows beyond which a fit gains nothing that a driver's remnant of half a hertz would let it: 42 min at 120 Hz.
 const MOST_ROWS: usize = 300_000;
+/// How much is used of a record that has more rows even so, s: what a fit costs grows with the square of the time.
+const LONGEST_S: f64 = 14_400.0;
 /// Rows a second that are left of more: two in the muscle's lag of 0.1 s.
 const LEAST_RATE_HZ: f64 = 20.0;
 
@@ -219,7 +221,11 @@ impl DriveLog {
 
     /// Every so many-th row, where there are more than a fit gains from: the least that leaves [`MOST_ROWS`], but not so many
     /// that fewer than [`LEAST_RATE_HZ`] would remain.
-    pub(crate) fn thinned(mut self) -> Self {
+    pub(crate) fn thinned(self) -> Self {
+        self.every_so_many_th().begun()
+    }
+
+    fn every_so_many_th(mut self) -> Self {
         let rate_hz = 1.0 / self.dt_s;
         let every = self
             .len()
@@ -233,13 +239,7 @@ impl DriveLog {
             format!("{} at {rate_hz:.0} Hz", self.len()),
             format!("one of {every} used"),
         ]);
-        for signal in [
-            &mut self.e_y_m,
-            &mut self.e_theta_rad,
-            &mut self.wheel_angle_rad,
-            &mut self.guidance_torque_nm,
-            &mut self.driver_torque_nm,
-        ] {
+        for signal in self.signals_mut() {
             *signal = signal.iter().copied().step_by(every).collect();
         }
         self.dt_s *= every as f64;
@@ -251,6 +251,35 @@ impl DriveLog {
             .step_by(every)
             .collect();
         self
+    }
+
+    /// Its beginning, where there are more rows than a fit gains from and it is longer than [`LONGEST_S`].
+    fn begun(mut self) -> Self {
+        let rows = (LONGEST_S / self.dt_s) as usize;
+        if self.len() > MOST_ROWS.max(rows) {
+            self.findings.push([
+                "rows".to_owned(),
+                format!("{:.1} h", self.len() as f64 * self.dt_s / 3600.0),
+                format!(
+                    "the first {} h used; --from and --to take others",
+                    LONGEST_S / 3600.0
+                ),
+            ]);
+            for signal in self.signals_mut() {
+                signal.truncate(rows);
+            }
+        }
+        self
+    }
+
+    const fn signals_mut(&mut self) -> [&mut Vec<f64>; 5] {
+        [
+            &mut self.e_y_m,
+            &mut self.e_theta_rad,
+            &mut self.wheel_angle_rad,
+            &mut self.guidance_torque_nm,
+            &mut self.driver_torque_nm,
+        ]
     }
 
     /// Keeps what the record says of the speed.

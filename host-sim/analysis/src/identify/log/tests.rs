@@ -349,23 +349,31 @@ fn of_more_rows_than_a_fit_gains_from_every_so_many_th_is_used() {
         };
         log.thinned()
     };
-    for (rows, rate_hz, every) in [
-        (300_000, 120.0, 1),
-        (300_001, 120.0, 2),
-        (600_000, 120.0, 2),
-        (600_001, 120.0, 3),
-        (900_000, 40.0, 2),
-        (900_000, 39.0, 1),
+    // 4 h are 561,600 rows at 39 Hz and 288,000 at 20 Hz.
+    for (rows, rate_hz, every, left) in [
+        (300_000, 120.0, 1, 300_000),
+        (300_001, 120.0, 2, 150_001),
+        (600_000, 120.0, 2, 300_000),
+        (600_001, 120.0, 3, 200_001),
+        (300_000, 12.0, 1, 300_000),
+        (561_600, 39.0, 1, 561_600),
+        (561_601, 39.0, 1, 561_600),
+        (600_000, 40.0, 2, 300_000),
+        (900_000, 40.0, 2, 288_000),
+        (900_000, 39.0, 1, 561_600),
     ] {
         let thin = log(rows, rate_hz);
-        assert_eq!(thin.len(), rows.div_ceil(every), "{rows} {rate_hz}");
+        assert_eq!(thin.len(), left, "{rows} {rate_hz}");
         for signal in thin.signals() {
             assert_eq!(signal[..3], [0.0, every as f64, 2.0 * every as f64]);
         }
         assert_eq!(thin.start_s, 5.0);
         assert!((thin.dt_s * rate_hz - every as f64).abs() < 1e-12);
-        assert_eq!(thin.findings.len(), usize::from(every > 1));
+        let is_cut = left < rows.div_ceil(every);
+        assert_eq!(thin.findings.len(), usize::from(every > 1) + usize::from(is_cut));
     }
+    let said = ["rows", "5.6 h", "the first 4 h used; --from and --to take others"].map(String::from);
+    assert_eq!(log(800_000, 40.0).findings[1], said);
     assert_eq!(log(600_000, 120.0).resampling, [0.5, 0.3]);
     let found = log(600_000, 120.0).findings;
     assert_eq!(

@@ -1,5 +1,6 @@
 //! `NAME=CHANNEL`: which channel of a file is a column of a log.
 
+use haptic_log::near::did_you_mean;
 use haptic_log::recording::Term;
 
 use super::{LogError, NAMES};
@@ -22,7 +23,10 @@ impl std::str::FromStr for Mapping {
             ));
         };
         let column = NAMES.iter().position(|column| *column == name.trim());
-        let column = column.ok_or_else(|| refuse(format!("{name:?} is none of {}", NAMES.join(", "))))?;
+        let column = column.ok_or_else(|| {
+            let near = did_you_mean(name.trim(), NAMES);
+            refuse(format!("{name:?} is none of {}{near}", NAMES.join(", ")))
+        })?;
         let term = channel.parse();
         Ok(Self {
             column,

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use haptic_log::formats::{self, Contents, Format, Reading};
+use haptic_log::near::did_you_mean;
 use haptic_log::notes::Note;
 use haptic_log::recording::{Group, Recording, Series, Term};
 use haptic_log::units;
@@ -100,9 +101,11 @@ impl Layout {
             Some((_, text)) => (*text).to_owned(),
             None if name.ends_with(".toml") => std::fs::read_to_string(name).map_err(|e| refused(&e))?,
             None => {
-                let known = BUILT_IN.map(|(known, _)| known).join(", ");
+                let known = BUILT_IN.map(|(known, _)| known);
+                let near = did_you_mean(name, known);
+                let known = known.join(", ");
                 return Err(refused(&format_args!(
-                    "one of {known}, or a file NAME.toml is wanted"
+                    "one of {known}, or a file NAME.toml is wanted{near}"
                 )));
             }
         };
