@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 
 use crate::dist;
-use crate::tool::{HOST_SIM, SHAPE, cargo, root, run};
+use crate::tool::{EVIDENCE, HOST_SIM, SHAPE, cargo, root, run};
 
 /// Which build of a binding is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,8 +39,7 @@ impl Built {
 
     /// The program behind `cargo xtask faults`, likewise.
     pub(crate) fn evidence(self) -> Result<PathBuf> {
-        let name = format!("evidence{}", std::env::consts::EXE_SUFFIX);
-        Ok(self.daily().package("haptic-evidence")?.join(name))
+        Ok(self.daily().package("haptic-evidence")?.join(EVIDENCE))
     }
 
     fn daily(self) -> Self {

@@ -60,6 +60,8 @@ impl Claim {
             .arg("--")
             .arg(name)
             .args(&passed.options)
+            // The name under which its help calls it.
+            .env("HAPTIC_BY_XTASK", "1")
             .current_dir(std::env::current_dir()?)
             .status()
             .context("cargo run -p haptic-evidence")?;

@@ -42,6 +42,8 @@ pub(crate) const ALL_FORMATS: &str = "host-sim/mcap";
 
 /// The command line's file.
 pub(crate) const HOST_SIM: &str = if cfg!(windows) { "host-sim.exe" } else { "host-sim" };
+/// The file of the program behind `cargo xtask faults`.
+pub(crate) const EVIDENCE: &str = if cfg!(windows) { "evidence.exe" } else { "evidence" };
 
 /// Runs a program whose output the user sees.
 pub(crate) fn run(command: &mut Command) -> Result<()> {

@@ -1,5 +1,6 @@
 //! What the claims about the controller and the identification rest on: campaigns, and studies of drivers whose truth is
-//! known. `cargo xtask` starts this program; the first command of the workbench does not compile it.
+//! known. `cargo xtask` starts this program from a checkout, and a release has it beside `host-sim`; the first command of the workbench does
+//! not compile it.
 //!
 //! A file below `cli` is a command, a file below `reports` what it shows. Not here: the campaign itself
 //! (`haptic-campaign`), the engine that drives (`haptic-batch`), and the figures that documents keep (`cargo xtask evidence`).
@@ -16,7 +17,7 @@ use cli::{availability, faults, handover, real_drives, reliance, validate};
 
 /// What the claims about controller and identification rest on
 #[derive(Debug, Parser)]
-#[command(version, bin_name = "cargo xtask")]
+#[command(version)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -55,7 +56,14 @@ enum Command {
 
 fn main() -> ExitCode {
     haptic_log::guard::keep_guarded_panics_quiet();
-    let parsed = Cli::command().mut_subcommands(signed).try_get_matches();
+    let name = match std::env::var_os("HAPTIC_BY_XTASK") {
+        Some(_) => "cargo xtask",
+        None => "evidence",
+    };
+    let parsed = Cli::command()
+        .bin_name(name)
+        .mut_subcommands(signed)
+        .try_get_matches();
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => error.exit(),

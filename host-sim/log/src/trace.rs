@@ -230,17 +230,3 @@ impl Trace {
         })
     }
 }
-
-/// The channels as a Markdown table, as `docs/reference/formats.md` holds it.
-#[must_use]
-pub fn table_of_channels() -> String {
-    let mut text = String::from("| column | unit | digits | of | meaning |\n|---|---|---|---|---|\n");
-    for channel in CHANNELS {
-        let (name, unit, digits, source) = (channel.name, channel.unit, channel.decimals, channel.source);
-        let meaning = channel.meaning.trim();
-        text.push_str(&format!(
-            "| `{name}` | {unit} | {digits} | {source} | {meaning} |\n"
-        ));
-    }
-    text
-}

@@ -2,7 +2,7 @@
 
 use haptic_log::recording::{Group, Recording, Series};
 use haptic_log::table::TableError;
-use haptic_log::trace::{CHANNELS, Sample, Trace, table_of_channels};
+use haptic_log::trace::{CHANNELS, Sample, Trace};
 
 fn written(trace: &Trace) -> String {
     let mut csv = Vec::new();
@@ -114,6 +114,19 @@ fn a_name_ends_with_its_unit() {
             channel.unit
         );
     }
+}
+
+/// The channels as a Markdown table.
+fn table_of_channels() -> String {
+    let mut text = String::from("| column | unit | digits | of | meaning |\n|---|---|---|---|---|\n");
+    for channel in CHANNELS {
+        let (name, unit, digits, source) = (channel.name, channel.unit, channel.decimals, channel.source);
+        let meaning = channel.meaning.trim();
+        text.push_str(&format!(
+            "| `{name}` | {unit} | {digits} | {source} | {meaning} |\n"
+        ));
+    }
+    text
 }
 
 #[test]

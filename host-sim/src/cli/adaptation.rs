@@ -8,8 +8,7 @@ use haptic_batch::compare::Kinds;
 use haptic_report::document::write_bytes;
 use haptic_report::studies::adaptation::report;
 
-use super::progress::Threads;
-use super::results::{LevelArgument, ResultArguments};
+use super::results::DrivenArguments;
 use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
@@ -18,19 +17,17 @@ pub(super) struct Arguments {
     #[arg(value_name = "FILE.toml")]
     file: PathBuf,
     #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    level: LevelArgument,
-    #[command(flatten)]
-    results: ResultArguments,
+    driven: DrivenArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
     let mut study = Adaptation::load(&arguments.file, &kinds)?;
-    study.level = arguments.level.level;
-    let output = arguments.results.begin("adaptation")?;
-    let results = progress::watched("drives", |watch| arguments.threads.run(|| study.run(watch)))??;
+    study.level = arguments.driven.level.level;
+    let output = arguments.driven.results.begin("adaptation")?;
+    let results = progress::watched("drives", |watch| {
+        arguments.driven.threads.run(|| study.run(watch))
+    })??;
     if let Some(place) = output.place() {
         write_bytes(&place.join("loops.csv"), results.to_csv())?;
     }

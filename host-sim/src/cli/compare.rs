@@ -7,8 +7,7 @@ use haptic_batch::compare::{Compare, Kinds};
 use haptic_report::document::definitions_table;
 use haptic_report::studies::compare::{driver_kinds, law_kinds, report};
 
-use super::progress::Threads;
-use super::results::{LevelArgument, ResultArguments};
+use super::results::DrivenArguments;
 use super::{BadInput, Outcome, print, progress};
 
 #[derive(Debug, Args)]
@@ -17,11 +16,7 @@ pub(super) struct Arguments {
     #[arg(value_name = "FILE.toml", required_unless_present = "list")]
     file: Option<PathBuf>,
     #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    level: LevelArgument,
-    #[command(flatten)]
-    results: ResultArguments,
+    driven: DrivenArguments,
     /// Print what a file may name, as Markdown, and drive nothing
     #[arg(long, value_enum, value_name = "WHAT", conflicts_with_all = ["file", "out", "json"])]
     list: Option<Named>,
@@ -57,11 +52,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let file = file.ok_or_else(|| BadInput("FILE.toml is missing".into()))?;
     let kinds = Kinds::default();
     let compare = Compare {
-        level: arguments.level.level,
+        level: arguments.driven.level.level,
         ..Compare::load(file, &kinds)?
     };
-    let output = arguments.results.begin("compare")?;
-    let results = progress::watched("drives", |watch| arguments.threads.run(|| compare.run(watch)))??;
+    let output = arguments.driven.results.begin("compare")?;
+    let results = progress::watched("drives", |watch| {
+        arguments.driven.threads.run(|| compare.run(watch))
+    })??;
     if let Some(place) = output.place() {
         results.write_tables(place)?;
     }

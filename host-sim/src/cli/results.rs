@@ -8,6 +8,7 @@ use haptic_report::document::{Report, write_json};
 use serde::Serialize;
 
 use super::output::Output;
+use super::progress::Threads;
 use super::{BadInput, Outcome, print, print_json, print_notes, width};
 
 /// Help of `--out` where a study always leaves files.
@@ -31,6 +32,17 @@ pub struct LevelArgument {
     #[arg(long, value_name = "SHARE", default_value = "0.95")]
     /// What was given, or 95 %.
     pub level: Confidence,
+}
+
+/// How a study is driven, how sure its intervals are, and where its results go.
+#[derive(Debug, Args)]
+pub(super) struct DrivenArguments {
+    #[command(flatten)]
+    pub(super) threads: Threads,
+    #[command(flatten)]
+    pub(super) level: LevelArgument,
+    #[command(flatten)]
+    pub(super) results: ResultArguments,
 }
 
 impl ResultArguments {

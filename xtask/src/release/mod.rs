@@ -37,7 +37,7 @@ pub(crate) struct Options {
 /// A part of a release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Part {
-    /// The command line, which runs where it is unpacked
+    /// The command line and the program behind the claims, which run where they are unpacked
     Program,
     /// The Python package, with the command line
     Wheel,
@@ -57,7 +57,7 @@ impl Part {
     /// The packages whose dependencies the part carries, their features, and the target they are built for.
     fn carries(self, host: &str) -> (&'static [&'static str], &'static str, String) {
         let (packages, features): (&[&str], _) = match self {
-            Self::Program => (&["host-sim"], ALL_FORMATS),
+            Self::Program => (&["host-sim", "haptic-evidence"], ALL_FORMATS),
             Self::Wheel => (&wheel::PACKAGES, ALL_FORMATS),
             Self::Fmu => (&["haptic-fmu"], ""),
             Self::C => (&["haptic-c"], ""),

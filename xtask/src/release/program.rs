@@ -10,18 +10,26 @@ use anyhow::{Context, Result, bail, ensure};
 use super::archive::{self, Entry};
 use super::{Part, Release, copy_into};
 use crate::built::Built;
-use crate::tool::{ALL_FORMATS, HOST_SIM, command, llvm, output, root, run};
+use crate::tool::{ALL_FORMATS, EVIDENCE, HOST_SIM, command, llvm, output, root, run};
 use crate::{dist, venv, wheel};
 
-/// The archive: program, examples, and a page that says what to do first.
+/// The archive: both programs, examples, and a page that says what to do first.
 pub(super) fn archive(release: &Release) -> Result<()> {
-    let program = match release.built {
-        Built::ToShip => dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM),
-        Built::ForTests | Built::Daily => dist::stripped(&Built::Daily.host_sim()?)?,
+    let (program, evidence) = match release.built {
+        // Both with all formats, so that what they share is compiled once.
+        Built::ToShip => (
+            dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM),
+            dist::build("haptic-evidence", ALL_FORMATS)?.join(EVIDENCE),
+        ),
+        Built::ForTests | Built::Daily => (
+            dist::stripped(&Built::Daily.host_sim()?)?,
+            dist::stripped(&Built::Daily.evidence()?)?,
+        ),
     };
     let name = format!("haptic-guidance-{}-{}", release.version, release.host);
     let mut entries = vec![
         Entry::read(&program, HOST_SIM)?.program(),
+        Entry::read(&evidence, EVIDENCE)?.program(),
         Entry::read(&root().join("xtask/src/release/README.txt"), "README.txt")?,
         Entry::read(&root().join("core/haptic.dbc"), "haptic.dbc")?,
         // A drive to identify.
@@ -40,9 +48,21 @@ pub(super) fn archive(release: &Release) -> Result<()> {
     let archive = release.pack(Part::Program, &name, entries)?;
     let place = release.try_in(Part::Program)?;
     archive::unpack(&archive, &place)?;
-    let program = place.join(&name).join(HOST_SIM);
-    old_enough(&program, release)?;
-    evaluate(&program, &place)
+    for program in [HOST_SIM, EVIDENCE] {
+        old_enough(&place.join(&name).join(program), release)?;
+    }
+    evaluate(&place.join(&name).join(HOST_SIM), &place)?;
+    let evidence = place.join(&name).join(EVIDENCE);
+    let reliance = [
+        "reliance",
+        "--participants",
+        "1",
+        "--seeds",
+        "1",
+        "--out",
+        "reliance",
+    ];
+    alone(&evidence, &place, &reliance, &["reliance/results.json"])
 }
 
 /// The wheel, installed by itself into an empty environment: what it depends on is PyPI's.
@@ -89,26 +109,34 @@ fn newest_glibc(said: &str) -> Option<(u32, u32)> {
     versions.max()
 }
 
-/// The main job, without the environment of whoever builds.
+/// The main job.
 fn evaluate(program: &Path, place: &Path) -> Result<()> {
+    let files = ["results.json", "report.html", "figure9.svg"].map(|file| format!("evaluation/{file}"));
+    let arguments = ["evaluate", "--out", "evaluation"];
+    alone(program, place, &arguments, &files.each_ref().map(String::as_str))
+}
+
+/// Runs a command that leaves files, without the environment of whoever builds.
+fn alone(program: &Path, place: &Path, arguments: &[&str], files: &[&str]) -> Result<()> {
     let start = Instant::now();
     let ended = Command::new(program)
         .env_clear()
         .current_dir(place)
-        .args(["evaluate", "--out", "evaluation"])
+        .args(arguments)
         .stdin(Stdio::null())
         .output()
         .with_context(|| program.display().to_string())?;
     if !ended.status.success() {
         bail!(
-            "{} evaluate: {}\n{}",
+            "{} {}: {}\n{}",
             program.display(),
+            arguments.join(" "),
             ended.status,
             String::from_utf8_lossy(&ended.stderr)
         );
     }
-    for file in ["results.json", "report.html", "figure9.svg"] {
-        let file = place.join("evaluation").join(file);
+    for file in files {
+        let file = place.join(file);
         ensure!(
             fs::metadata(&file).is_ok_and(|file| file.len() > 0),
             "{} is missing",
@@ -116,7 +144,8 @@ fn evaluate(program: &Path, place: &Path) -> Result<()> {
         );
     }
     println!(
-        "evaluates in an empty environment in {:.1} s",
+        "{} in an empty environment in {:.1} s",
+        arguments[0],
         start.elapsed().as_secs_f64()
     );
     Ok(())

@@ -27,6 +27,7 @@ mod mdf;
 mod mdf_bus;
 #[cfg(feature = "parquet")]
 mod parquet;
+pub mod protection;
 mod write;
 
 use std::collections::HashSet;

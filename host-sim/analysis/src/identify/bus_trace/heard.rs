@@ -3,8 +3,8 @@
 use can_dbc::{Dbc, Message, Signal};
 use haptic_log::bus::BusFrame;
 use haptic_log::formats::dbc::{identifier, raw};
+use haptic_log::formats::protection::Auditor;
 
-use super::protection::Auditor;
 use super::{AGE, E_THETA, E_Y, LogError, VALID, refuse};
 
 /// A value of a needed signal, in SI units.

@@ -8,13 +8,12 @@
 //! driver's far point is not on the bus; [`far_point`] computes it, and a note says so.
 //!
 //! The signals are put on an even grid at the pace of the camera: T_h as held at each instant, the others on the line
-//! between their neighbours. Frames with a wrong CRC are not used and those that are lost are counted ([`protection`]);
+//! between their neighbours. Frames with a wrong CRC are not used and those that are lost are counted ([`haptic_log::formats::protection`]);
 //! where a signal pauses or the preview is not valid, it is missing, and the preflight bridges or cuts the drive there. So
 //! it is where the vehicle is slower than its model goes.
 
 mod far_point;
 mod heard;
-mod protection;
 mod survey;
 
 use std::ops::RangeInclusive;

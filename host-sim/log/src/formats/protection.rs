@@ -1,4 +1,4 @@
-//! The end-to-end protection of the frames of a trace (AUTOSAR E2E profile 2), as far as the DBC file says what it is:
+//! The end-to-end protection of recorded frames (AUTOSAR E2E profile 2), as far as the DBC file says what it is:
 //! frames with a wrong CRC are not used, and the counter tells how many were lost.
 //!
 //! The DBC's attributes are those of `core/haptic.dbc`: `E2EDataIds`, sixteen bytes in hexadecimal. Without them
@@ -6,7 +6,8 @@
 
 use can_dbc::{AttributeValue, Dbc, Message, MessageId};
 use crc::{CRC_8_AUTOSAR, Crc};
-use haptic_log::bus::BusFrame;
+
+use crate::bus::BusFrame;
 
 static CRC: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
 
@@ -14,7 +15,7 @@ static CRC: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
 const AT_ONCE_S: f64 = 1e-3;
 
 /// Tells which of a message's frames can be used, and counts the others.
-pub(super) struct Auditor {
+pub struct Auditor {
     name: String,
     /// The data IDs; without them nothing is checked.
     list: Option<[u8; 16]>,
@@ -28,7 +29,8 @@ pub(super) struct Auditor {
 
 impl Auditor {
     /// Checks the frames of a message.
-    pub(super) fn of(dbc: &Dbc, message: &Message) -> Self {
+    #[must_use]
+    pub fn of(dbc: &Dbc, message: &Message) -> Self {
         Self {
             name: message.name.clone(),
             list: data_ids(dbc, message.id),
@@ -42,12 +44,13 @@ impl Auditor {
     }
 
     /// How many frames came.
-    pub(super) const fn frames(&self) -> usize {
+    #[must_use]
+    pub const fn frames(&self) -> usize {
         self.frames
     }
 
     /// Whether the next frame can be used.
-    pub(super) fn takes(&mut self, frame: &BusFrame) -> bool {
+    pub fn takes(&mut self, frame: &BusFrame) -> bool {
         self.frames += 1;
         let Some(list) = &self.list else {
             return true;
@@ -69,7 +72,8 @@ impl Auditor {
     }
 
     /// In words: what, found, done; nothing for a message without fault.
-    pub(super) fn finding(&self) -> Option<[String; 3]> {
+    #[must_use]
+    pub fn finding(&self) -> Option<[String; 3]> {
         let Self {
             name,
             frames,
