@@ -112,7 +112,8 @@ pub(crate) fn crates() -> Result<PathBuf> {
 
 /// The commit that is built, for an image to say; a plus where the checkout has changes.
 pub(crate) fn commit() -> String {
-    let said = output(command("git").args(["describe", "--always", "--exclude=*", "--abbrev=12", "--dirty=+"]));
+    let said =
+        output(command("git").args(["describe", "--always", "--exclude=*", "--abbrev=12", "--dirty=+"]));
     said.map_or("nobody said".to_owned(), |commit| commit.trim().to_owned())
 }
 
