@@ -53,7 +53,11 @@ struct Counts {
 
 /// Runs the product. `disturb` is called before each step with its number: the product has nothing to say there,
 /// the image that breaks itself has.
-pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot, u32)) -> ! {
+pub fn run(
+    ecu: &'static mut Option<Ecu>,
+    service: &'static mut Option<Service>,
+    mut disturb: impl FnMut(&mut Ecu, Boot, u32),
+) -> ! {
     stack::paint();
     let mut board = ThisBoard::start();
     let mut boot = reset::boot(board.reset_source());
@@ -74,7 +78,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
         is_image_whole: image == image::State::Whole,
         key: is_sound.then(|| storage::key(board.flash())).flatten(),
     };
-    let mut service = Service::new(found, params, origin, cells);
+    let service = serve(service, found, params, origin, cells);
     let mut counts = Counts::default();
     defmt::info!(
         "steering-ecu on {=str}, reset cause {=u8}, resets of late {=u8}, parameters {=u32}",
@@ -95,10 +99,10 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
     board.start_watchdog();
     loop {
         board.sleep();
-        receive(&mut board, ecu, &mut service, &mut counts);
+        receive(&mut board, ecu, service, &mut counts);
         if board.tick() {
             disturb(ecu, boot, counts.steps);
-            step(&mut board, ecu, &mut service, cells, &mut counts);
+            step(&mut board, ecu, service, cells, &mut counts);
         }
     }
 }
@@ -155,6 +159,18 @@ fn parameters(board: &mut ThisBoard) -> Found {
 #[inline(never)]
 fn begin(ecu: &'static mut Option<Ecu>, setup: Option<&Setup>, boot: Boot) -> &'static mut Ecu {
     ecu.insert(Ecu::new(setup, boot, ThisBoard::now()))
+}
+
+/// Puts the service together, apart for the reason of [`begin`].
+#[inline(never)]
+fn serve(
+    service: &'static mut Option<Service>,
+    found: Found,
+    params: Option<Params>,
+    origin: Origin,
+    cells: &Cells,
+) -> &'static mut Service {
+    service.insert(Service::new(found, params, origin, cells))
 }
 
 /// What the controller starts with; None locks it.

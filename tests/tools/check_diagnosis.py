@@ -1,9 +1,10 @@
-"""Diagnosis as a workshop's own tools meet it: udsoncan over can-isotp over python-can's slcan, with the product's image in QEMU.
+"""Diagnosis as a workshop's own tools meet it: udsoncan over can-isotp over python-can's slcan, with an image in QEMU.
 
-    python tests/tools/check_diagnosis.py IMAGE.elf
+    python tests/tools/check_diagnosis.py target/release/host-sim     # the bus of `host-sim ecu run`
+    python tests/tools/check_diagnosis.py IMAGE.elf                   # the product's serial port, on a computer with time for it
 
 A fault is injected, its code is read, found again after a reset, and cleared; a parameter is read, written behind security access, and
-read back after the restart. The machine does not wait for this program, so what came too late is asked again, a few times.
+read back after the restart. The ECU does not wait for this program, so what came too late is asked again, a few times.
 """
 
 import struct
@@ -35,7 +36,7 @@ OWN_IDENTIFIER, DEADLINE = 0x511100, 0x510800  # C1111, C1108
 TORQUE_LIMIT = 0x1000  # and the parameter's place in the list, from the DBC file
 SEQUENCE, COMMIT = 0x0201, 0x0200
 PATIENCE = 60
-SPEED_MS = 20  # the slowest that an ECU takes for one: a serial port in QEMU carries few bytes
+SPEED_MS = 20  # nearly the slowest that an ECU takes for one
 PATIENT = {"tx_padding": 0xCC, "rx_consecutive_frame_timeout": 10_000, "rx_flowcontrol_timeout": 10_000}
 
 
@@ -55,8 +56,23 @@ class Codec(udsoncan.DidCodec):
         return struct.calcsize(self.layout)
 
 
+class Bench:
+    """The ECU of `host-sim ecu run`, on any port that is free."""
+
+    def __init__(self, host_sim):
+        arguments = [host_sim, "ecu", "run", "--listen", "127.0.0.1:0"]
+        self.program = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        # "the ECU is on the bus at 127.0.0.1:40123; Ctrl-C ends it"
+        line = self.program.stdout.readline()
+        self.port = "socket://" + line.split(" at ")[1].split(";")[0]
+
+    def end(self):
+        self.program.terminate()
+        self.program.wait()
+
+
 class Machine:
-    """The image in QEMU, its bus on a pseudo-terminal."""
+    """The product in QEMU, its bus on a pseudo-terminal."""
 
     def __init__(self, elf):
         arguments = "-machine mps2-an386 -display none -monitor none -serial pty -serial null -icount shift=5,align=on"
@@ -91,7 +107,7 @@ class Slcan(slcanBus):
     def _read(self, timeout):
         until = time.monotonic() + (timeout or 0)
         while not self.lines:
-            self._buffer.extend(self.serialPortOrig.read(self.serialPortOrig.in_waiting or 1))
+            self._buffer.extend(self.serialPortOrig.read(4096))
             *whole, rest = bytes(self._buffer).split(b"\r")
             self._buffer[:] = rest
             self.lines.extend(line.decode() + "\r" for line in whole if line.startswith(b"t738"))
@@ -264,12 +280,12 @@ def parameter(tester, bus, did):
     print(f"torque_limit_nm was {before} N.m and is {after} N.m after the restart")
 
 
-def main(elf):
+def main(program):
     database = cantools.database.load_file(DBC)
     names = database.get_message_by_name("ParameterValue").get_signal_by_name("ParameterValue_Index").choices
     did = TORQUE_LIMIT + next(code for code, name in names.items() if str(name).lower() == "torque_limit_nm")
     sender = Sender(database, "Vehicle")
-    machine = Machine(elf)
+    machine = Bench(program) if Path(program).name == "host-sim" else Machine(program)
     try:
         with Slcan(machine.port, sender) as bus:
             tester = Tester(bus, did)
@@ -279,6 +295,7 @@ def main(elf):
             reset(tester, bus)
             parameter(tester, bus, did)
             assert tester.status(DEADLINE) is None, "a step was late"
+            tester.client.close()
     finally:
         machine.end()
 

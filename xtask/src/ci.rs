@@ -82,7 +82,7 @@ const STAGES: &[Stage] = stages! {
     "images" Meanwhile "the images that tests start in QEMU": images;
     "recordings" Beside "files of other tools, read and written by these tools":
         || logs::check(Built::ForTests);
-    "diagnosis" Beside "a workshop's tester of other makers against the product in QEMU; its PDX file":
+    "diagnosis" Beside "a workshop's tester of other makers against an image in QEMU; its PDX file":
         || diagnosis::check(Built::ForTests);
     "documentation" Beside "cargo doc without a warning": documentation;
     "fmu" Beside "the FMUs, judged by FMPy": || fmu::check(Built::ForTests);

@@ -79,6 +79,7 @@ macro_rules! data {
     };
 }
 
+#[derive(Clone, Copy)]
 enum Access {
     Read,
     Write,

@@ -14,7 +14,7 @@ pub type Bytes = [u8; 8];
 
 /// The longest message.
 pub const LONGEST: u16 = 4095;
-/// Between two frames of a message, and before flow control, ms (N_Cr, N_Bs).
+/// Between two frames of a message, before flow control, and until a frame has left, ms (N_Cr, N_Bs, N_As).
 pub const TIMEOUT_MS: u32 = 1000;
 /// So many consecutive frames come before the next flow control.
 pub const BLOCK_SIZE: u8 = 8;
@@ -91,6 +91,8 @@ pub struct Link<const R: usize, const S: usize> {
     /// Bytes of the message that have left, and the number of the next consecutive frame.
     sent: u16,
     number: u8,
+    /// Since when a frame is due that found no place.
+    due_ms: Option<u32>,
 }
 
 impl<const R: usize, const S: usize> Default for Link<R, S> {
@@ -109,6 +111,7 @@ impl<const R: usize, const S: usize> Link<R, S> {
         sending: Sending::Idle,
         sent: 0,
         number: 0,
+        due_ms: None,
     };
 
     /// Takes the data of a frame under the peer's identifier. What is not of the protocol, or not due, is ignored.
@@ -287,6 +290,11 @@ impl<const R: usize, const S: usize> Link<R, S> {
         {
             self.sending = Sending::Idle;
         }
+        if self.frame(now_ms).is_none() {
+            self.due_ms = None;
+        } else if is_late(*self.due_ms.get_or_insert(now_ms)) {
+            (self.sending, self.flow, self.due_ms) = (Sending::Idle, None, None);
+        }
     }
 
     /// The frame that is due: flow control before what is sent.
@@ -320,6 +328,7 @@ impl<const R: usize, const S: usize> Link<R, S> {
 
     /// The frame that was due has left.
     pub fn sent(&mut self, now_ms: u32) {
+        self.due_ms = None;
         if self.flow.take().is_some() {
             return;
         }

@@ -198,6 +198,24 @@ fn a_peer_that_is_silent_waits_for_ever_or_has_no_room_is_given_up() {
     assert_eq!(next(&mut idle, 1), None);
 }
 
+/// A bus that takes nothing: the answer is out of date by then.
+#[test]
+fn a_frame_that_does_not_leave_is_given_up() {
+    for request in [&[][..], &[0x10, 20, 0, 1, 2, 3, 4, 5]] {
+        let mut link = Small::NEW;
+        link.receive(request, 0);
+        if request.is_empty() {
+            assert!(link.send(&[1, 2, 3]));
+        }
+        for now in 0..=1000 {
+            link.age(now);
+            assert!(link.frame(now).is_some(), "{now} ms");
+        }
+        link.age(1001);
+        assert_eq!((link.frame(1001), link.is_sending()), (None, false));
+    }
+}
+
 #[test]
 fn a_message_without_a_place_is_not_begun() {
     let mut link = Small::NEW;

@@ -15,6 +15,7 @@ mod target {
     use haptic_core::bus::messages::ResetCause;
     use haptic_core::ecu::Ecu;
     use haptic_core::ecu::injection::Region;
+    use haptic_firmware::service::Service;
     use haptic_firmware::{host, product};
 
     /// The step that breaks.
@@ -23,6 +24,7 @@ mod target {
     #[entry]
     fn main() -> ! {
         static mut ECU: Option<Ecu> = None;
+        static mut SERVICE: Option<Service> = None;
         let mut buffer = [0; 128];
         let arguments = host::command_line(&mut buffer);
         let flaw = match arguments.split(' ').next_back() {
@@ -33,7 +35,7 @@ mod target {
             Some("veto") => Flaw::Veto,
             _ => Flaw::HangAlways,
         };
-        product::run(ECU, move |ecu, boot, step| {
+        product::run(ECU, SERVICE, move |ecu, boot, step| {
             if step == AT && (boot.reset == ResetCause::PowerOn || flaw == Flaw::HangAlways) {
                 break_down(flaw, ecu);
             }

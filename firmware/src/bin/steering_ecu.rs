@@ -12,12 +12,14 @@ mod target {
     use cortex_m_rt::entry;
     use haptic_core::ecu::Ecu;
     use haptic_firmware::product;
+    use haptic_firmware::service::Service;
 
     #[entry]
     fn main() -> ! {
         // A static and not on the stack, so that its size shows in the image's RAM.
         static mut ECU: Option<Ecu> = None;
-        product::run(ECU, |_, _, _| {})
+        static mut SERVICE: Option<Service> = None;
+        product::run(ECU, SERVICE, |_, _, _| {})
     }
 
     haptic_firmware::stop_on_panic_and_fault!();

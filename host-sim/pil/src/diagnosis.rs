@@ -21,7 +21,7 @@ use super::PilError;
 use super::parameters::{Product, standing};
 
 /// The ECU answers within 50 ms; adapter and computer take their own time.
-const ANSWER_WITHIN: Duration = Duration::from_secs(2);
+const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 /// Our speeds are 10 ms apart, and the set is with the download within a quarter of a second.
 const SPEED_PERIOD: Duration = Duration::from_millis(10);
 const HANDED_OVER: Duration = Duration::from_millis(600);

@@ -16,6 +16,8 @@ use haptic_core::quantity::Speed;
 use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
 use haptic_core::service::download;
+use haptic_diag::isotp::Link;
+use haptic_diag::security::{BENCH_KEY, mac};
 use haptic_pil::PilError;
 use haptic_pil::bench::Bench;
 
@@ -247,6 +249,118 @@ fn parameters_can_be_tried() {
     send(&mut client, &mut bench, 1, still, &mut counter);
     let heard = client.drive(&mut bench, 1100, still, &mut counter);
     assert_eq!(last(&heard).outcome, WriteOutcome::TooSoon);
+    bench.end().unwrap();
+}
+
+/// A tester beside a vehicle that stands, a millisecond at a time.
+struct Tester {
+    client: Client,
+    link: Link<256, 64>,
+    counter: u8,
+    ms: u32,
+}
+
+impl Tester {
+    /// A millisecond; whatever the ECU says beside its answers is dropped.
+    fn tick(&mut self, bench: &mut Bench) {
+        while let Some(bytes) = self.link.frame(self.ms) {
+            self.client.say(&Frame::full(haptic_diag::REQUEST_ID, bytes));
+            self.link.sent(self.ms);
+        }
+        let still = Speed::from_m_per_s(0.0);
+        // Of ten milliseconds one has the vehicle's message.
+        let ms = if self.ms.is_multiple_of(10) { 1 } else { 0 };
+        let mut heard = self.client.drive(bench, ms, still, &mut self.counter);
+        if ms == 0 {
+            bench.tick().unwrap();
+            heard.extend(self.client.heard());
+        }
+        for frame in heard
+            .iter()
+            .filter(|frame| frame.id() == haptic_diag::RESPONSE_ID)
+        {
+            self.link.receive(frame.data(), self.ms);
+        }
+        self.ms += 1;
+    }
+
+    fn wait(&mut self, bench: &mut Bench, ms: u32) {
+        (0..ms).for_each(|_| self.tick(bench));
+    }
+
+    fn ask(&mut self, bench: &mut Bench, request: &[u8]) -> Vec<u8> {
+        assert!(self.link.send(request));
+        for _ in 0..1000 {
+            self.tick(bench);
+            if let Some(message) = self.link.message() {
+                let answer = message.bytes.to_vec();
+                self.link.done();
+                return answer;
+            }
+        }
+        panic!("{request:02X?}: no answer in a second");
+    }
+
+    fn unlock(&mut self, bench: &mut Bench) {
+        assert_eq!(self.ask(bench, &[0x10, 3])[0], 0x50);
+        let challenge = self.ask(bench, &[0x27, 1]);
+        let proof = [&[0x27, 2][..], &mac(&BENCH_KEY, &challenge[2..])].concat();
+        assert_eq!(self.ask(bench, &proof), [0x67, 2]);
+    }
+}
+
+/// C1111, that somebody sends under the ECU's own identifier, which is the fault that this test makes.
+#[test]
+fn a_tester_finds_a_fault_after_a_reset_and_has_a_parameter_stored() {
+    let mut bench = Bench::start("127.0.0.1:0").unwrap();
+    let mut tester = Tester {
+        client: Client::join(&bench),
+        link: Link::NEW,
+        counter: 0,
+        ms: 0,
+    };
+    tester.wait(&mut bench, 1500);
+    let [codes, clear, limit, sequence]: [&[u8]; 4] = [
+        &[0x19, 6, 0x51, 0x11, 0, 1],
+        &[0x14, 0xFF, 0xFF, 0xFF],
+        &[0x22, 0x10, 6],
+        &[0x22, 2, 1],
+    ];
+    assert_eq!(tester.ask(&mut bench, codes), [0x59, 6, 0x51, 0x11, 0, 0]);
+    tester.client.say(&Frame::new(FOREIGN, &[0; 8]).unwrap());
+    tester.wait(&mut bench, 20);
+    assert_eq!(
+        tester.ask(&mut bench, codes),
+        [0x59, 6, 0x51, 0x11, 0, 0x2B, 1, 1]
+    );
+    assert_eq!(tester.ask(&mut bench, limit)[3..], 5_f32.to_be_bytes());
+    // The fault lasts for a second, in which the ECU hands over; then it is in Standby again.
+    tester.wait(&mut bench, 3500);
+    let write = [&[0x2E, 0x10, 6][..], &3_f32.to_be_bytes()].concat();
+    assert_eq!(tester.ask(&mut bench, &[0x10, 3])[0], 0x50);
+    assert_eq!(tester.ask(&mut bench, &write), [0x7F, 0x2E, 0x33]);
+    tester.unlock(&mut bench);
+    assert_eq!(tester.ask(&mut bench, &write), [0x6E, 0x10, 6]);
+    assert_eq!(tester.ask(&mut bench, &[0x31, 1, 2, 0]), [0x71, 1, 2, 0]);
+    tester.wait(&mut bench, 500);
+    assert_eq!(tester.ask(&mut bench, sequence)[3..], [0, 0, 0, 1]);
+    assert_eq!(tester.ask(&mut bench, limit)[3..], 3_f32.to_be_bytes());
+    // It has started anew, and the code is there; cleared it is not.
+    assert_eq!(
+        tester.ask(&mut bench, codes),
+        [0x59, 6, 0x51, 0x11, 0, 0x28, 1, 1]
+    );
+    tester.wait(&mut bench, 1500);
+    tester.unlock(&mut bench);
+    assert_eq!(tester.ask(&mut bench, &[0x11, 1]), [0x51, 1]);
+    tester.wait(&mut bench, 200);
+    let uptime = tester.ask(&mut bench, &[0x22, 3, 4]);
+    assert!(uptime[3..6] == [0, 0, 0], "a start within 256 ms: {uptime:02X?}");
+    assert_eq!(tester.ask(&mut bench, limit)[3..], 3_f32.to_be_bytes());
+    assert_eq!(tester.ask(&mut bench, codes)[5], 0x28);
+    assert_eq!(tester.ask(&mut bench, &[0x10, 3])[0], 0x50);
+    assert_eq!(tester.ask(&mut bench, clear), [0x54]);
+    assert_eq!(tester.ask(&mut bench, codes), [0x59, 6, 0x51, 0x11, 0, 0]);
     bench.end().unwrap();
 }
 

@@ -1,0 +1,258 @@
+use std::collections::HashSet;
+
+use haptic_diag::fresh::{Cmac, Mac, Offer, Proof, Receiver, Sender, SipHash};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+use crate::rig::KEY;
+
+const ID: u16 = 0x130;
+
+/// RFC 4493: the first four bytes of its second example. SipHash-2-4: the first word of the reference's vectors for its key, of
+/// messages of 0 and 15 bytes (Aumasson and Bernstein, appendix A).
+#[test]
+fn both_macs_are_those_of_their_papers() {
+    let message = [
+        0x6B, 0xC1, 0xBE, 0xE2, 0x2E, 0x40, 0x9F, 0x96, 0xE9, 0x3D, 0x7E, 0x11, 0x73, 0x93, 0x17, 0x2A,
+    ];
+    assert_eq!(Cmac(KEY).tag(&message), 0x070A_16B4);
+    let counting: [u8; 16] = std::array::from_fn(|k| k as u8);
+    assert_eq!(SipHash(counting).tag(&[]), 0x310E_0EDD);
+    // 0xa129ca6149be45e5, little-endian.
+    assert_eq!(SipHash(counting).tag(&counting[..15]), 0xE545_BE49);
+}
+
+/// Two ends, and what an eavesdropper has.
+struct Bus<M, const TAG: u32> {
+    mac: M,
+    sender: Sender<M, 8, TAG>,
+    receiver: Receiver<M, 8, TAG>,
+    starts: u32,
+    random: SmallRng,
+    /// Payloads count up, so that each was sent once.
+    sent: u64,
+    taken: HashSet<u64>,
+    /// Frames that were taken twice, or that nobody sent.
+    false_ones: u64,
+    frames: Vec<(u64, Proof)>,
+    questions: Vec<u32>,
+    offers: Vec<Offer>,
+}
+
+impl<M: Mac + Clone, const TAG: u32> Bus<M, TAG> {
+    fn new(mac: M, seed: u64) -> Self {
+        Self {
+            sender: Sender::new(mac.clone(), ID),
+            receiver: Receiver::new(mac.clone(), ID, 1),
+            starts: 1,
+            mac,
+            random: SmallRng::seed_from_u64(seed),
+            sent: 0,
+            taken: HashSet::new(),
+            false_ones: 0,
+            frames: Vec::new(),
+            questions: Vec::new(),
+            offers: Vec::new(),
+        }
+    }
+
+    /// A frame comes: whether it is taken.
+    fn come(&mut self, payload: u64, proof: &Proof) -> bool {
+        let is_taken = self.receiver.accept(&payload.to_le_bytes(), proof);
+        if is_taken {
+            let is_true = payload <= self.sent && self.taken.insert(payload);
+            self.false_ones += u64::from(!is_true);
+        }
+        is_taken
+    }
+
+    fn send(&mut self) -> Option<(u64, Proof)> {
+        self.sent += 1;
+        let proof = self.sender.prove(&self.sent.to_le_bytes())?;
+        self.frames.push((self.sent, proof));
+        Some((self.sent, proof))
+    }
+
+    fn synchronise(&mut self) {
+        let question = self.sender.ask(self.random.random());
+        self.questions.push(question);
+        let offer = self.receiver.offer(question).unwrap();
+        self.offers.push(offer);
+        self.sender.take(&offer);
+    }
+
+    /// Whoever listened says old things, and some of his own.
+    fn attack(&mut self) {
+        for _ in 0..2 {
+            if !self.frames.is_empty() {
+                // Of late, or of long ago.
+                let back = if self.random.random_bool(0.5) {
+                    600
+                } else {
+                    usize::MAX
+                };
+                let from = self.frames.len().saturating_sub(back);
+                let (payload, proof) = self.frames[self.random.random_range(from..self.frames.len())];
+                self.come(payload, &proof);
+                // A proof of another payload's.
+                self.come(payload + 1_000_000_000, &proof);
+            }
+        }
+        if let Some(question) = self
+            .questions
+            .get(self.random.random_range(0..=self.questions.len()))
+        {
+            // What he hears then is kept for later.
+            self.offers.extend(self.receiver.offer(*question));
+        }
+        if let Some(offer) = self.offers.get(self.random.random_range(0..=self.offers.len())) {
+            self.sender.take(&offer.clone());
+        }
+        let forged = Offer {
+            epoch: self.random.random_range(4096..20_000),
+            tag: self.random.random(),
+        };
+        self.sender.take(&forged);
+    }
+}
+
+/// Frames of which a tenth is lost, some come late, old ones are repeated, and both sides reset now and then; communication is back
+/// with the first frame behind an offer. How many were taken twice, or were nobody's.
+fn drive<M: Mac + Clone, const TAG: u32>(mac: M, frames: u64) -> u64 {
+    let mut bus = Bus::<M, TAG>::new(mac, 47);
+    bus.synchronise();
+    let (mut late, mut lost, mut resets, mut refused) = (None, 0_u64, 0_u64, 0);
+    while bus.sent < frames {
+        match bus.random.random_range(0..2000) {
+            0 => {
+                // What it counted is gone, and nothing is on its way to it.
+                bus.sender = Sender::new(bus.mac.clone(), ID);
+                bus.synchronise();
+                resets += 1;
+                let (payload, proof) = bus.send().unwrap();
+                assert!(bus.come(payload, &proof), "back with the first frame");
+            }
+            1 => {
+                bus.starts += 1;
+                bus.receiver = Receiver::new(bus.mac.clone(), ID, bus.starts);
+                assert!(bus.receiver.is_unsynchronised());
+                let (payload, proof) = bus.send().unwrap();
+                assert!(!bus.come(payload, &proof), "of an old epoch");
+                bus.synchronise();
+                resets += 1;
+                let (payload, proof) = bus.send().unwrap();
+                assert!(bus.come(payload, &proof), "back with the next frame");
+            }
+            _ => {}
+        }
+        let (payload, proof) = bus.send().unwrap();
+        match bus.random.random_range(0..100) {
+            0..10 => lost += 1,
+            10..15 => late = Some((payload, proof)),
+            _ => {
+                if !bus.come(payload, &proof) {
+                    refused += 1;
+                    bus.synchronise();
+                }
+            }
+        }
+        if let Some((payload, proof)) = late.take_if(|(late, _)| *late != payload) {
+            // It is behind one that was taken, or it is not.
+            bus.come(payload, &proof);
+        }
+        bus.attack();
+    }
+    let taken = bus.taken.len() as u64;
+    assert!(taken > frames * 8 / 10, "{taken} of {frames}");
+    assert!(
+        resets > frames / 2000 && lost > frames / 20,
+        "{resets} resets, {lost} lost"
+    );
+    // Lost and late frames are no reason; a false one is, which carries the count or the epoch on.
+    assert!(refused <= bus.false_ones, "{refused} refused");
+    bus.false_ones
+}
+
+#[test]
+fn of_a_million_frames_none_is_taken_twice() {
+    assert_eq!(drive::<_, 32>(SipHash(KEY), 1_000_000), 0);
+}
+
+/// A tag of 24 bits lets one false frame of 16.7 million pass in each of two epochs. Of four million 0.5 are expected, and more than
+/// four with a probability of 0.0002.
+#[test]
+fn a_short_tag_lets_as_many_pass_as_chance_does() {
+    assert!(drive::<_, 24>(SipHash(KEY), 1_000_000) <= 4);
+}
+
+#[test]
+fn aes_does_it_too() {
+    assert_eq!(drive::<_, 32>(Cmac(KEY), 20_000), 0);
+}
+
+#[test]
+fn a_proof_is_of_its_identifier_payload_count_and_key() {
+    let pair = || {
+        let mut sender = Sender::<_, 4, 24>::new(Cmac(KEY), ID);
+        let receiver = Receiver::<_, 4, 24>::new(Cmac(KEY), ID, 7);
+        let question = sender.ask(3);
+        sender.take(&receiver.offer(question).unwrap());
+        (sender, receiver)
+    };
+    let (mut sender, mut receiver) = pair();
+    let proof = sender.prove(b"payload").unwrap();
+    let mut other = Receiver::<_, 4, 24>::new(Cmac(KEY), ID + 1, 7);
+    assert!(!other.accept(b"payload", &proof), "another identifier");
+    let mut other = Receiver::<_, 4, 24>::new(Cmac([0; 16]), ID, 7);
+    assert!(!other.accept(b"payload", &proof), "another key");
+    assert!(!receiver.accept(b"Payload", &proof) && !receiver.accept(b"payloa", &proof));
+    for bit in 0..24 {
+        let tag = proof.tag ^ 1 << bit;
+        assert!(!receiver.accept(b"payload", &Proof { tag, ..proof }), "bit {bit}");
+    }
+    for count in (0..=255).filter(|count| *count != proof.count) {
+        assert!(
+            !receiver.accept(b"payload", &Proof { count, ..proof }),
+            "count {count}"
+        );
+    }
+    assert!(receiver.accept(b"payload", &proof) && !receiver.accept(b"payload", &proof));
+    // Fourteen may be lost of four bits; fifteen are one too many.
+    for (lost, is_taken) in [(14, true), (15, false)] {
+        let (mut sender, mut receiver) = pair();
+        assert!(receiver.accept(b"", &sender.prove(b"").unwrap()));
+        for _ in 0..lost {
+            assert!(sender.prove(b"").is_some());
+        }
+        assert_eq!(
+            receiver.accept(b"", &sender.prove(b"").unwrap()),
+            is_taken,
+            "{lost} lost"
+        );
+    }
+    assert_eq!(sender.prove(&[0; 65]), None, "too long");
+    assert_eq!(
+        Sender::<_, 4, 24>::new(Cmac(KEY), ID).prove(b""),
+        None,
+        "no epoch"
+    );
+}
+
+/// An offer answers the last question of its sender, once.
+#[test]
+fn an_old_offer_is_none() {
+    let (mut sender, receiver) = (
+        Sender::<_, 8, 24>::new(Cmac(KEY), ID),
+        Receiver::<_, 8, 24>::new(Cmac(KEY), ID, 1),
+    );
+    let question = sender.ask(1);
+    let old = receiver.offer(question).unwrap();
+    sender.ask(2);
+    sender.take(&old);
+    assert_eq!(sender.prove(b""), None);
+    sender.take(&receiver.offer(2).unwrap());
+    let first = sender.prove(b"").unwrap();
+    // Taken again it would count from the beginning.
+    sender.take(&receiver.offer(2).unwrap());
+    assert_ne!(sender.prove(b"").unwrap(), first);
+}
