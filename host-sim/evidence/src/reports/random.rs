@@ -24,8 +24,8 @@ pub(super) fn summary(found: &RandomDrives) -> String {
     } = found;
     format!(
         "Seed {}, probe {} N.m: {} drives, and {} more in which the car left its lane, which tell nothing. Wrong of the identified values: \
-         {}; in honest drives {}, in the others {}. Honest logs that are accused: {}. Their 95 % intervals hold the truth in {}. \
-         Of the logs in which something is wrong {} are refuted.",
+         {}; in honest drives {}, in the others {}. Honest logs that are accused: {}; logs in which something is wrong that are refuted: \
+         {}. The 95 % intervals of honest drives hold the truth in {}.",
         plan.seed,
         plan.probe_nm,
         all.drives,
@@ -34,8 +34,8 @@ pub(super) fn summary(found: &RandomDrives) -> String {
         in_words(honest.wrong),
         in_words(wrong.wrong),
         in_words(honest.refuted),
-        in_words(honest.held),
         in_words(wrong.refuted),
+        in_words(honest.held),
     )
 }
 
