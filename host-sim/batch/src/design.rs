@@ -3,13 +3,15 @@
 //! The drivers asked about drive each course once with each probe, in the simulator; Fisher's information of the record,
 //! at the truth, says how small the standard errors of an unbiased estimator can be. Information grows with the length of the
 //! drive, which gives the length for an error. Two probes one after the other share the drive. The best design is then
-//! driven and identified over and over, and the error that comes of it stands beside the one that was predicted.
+//! driven and identified over and over: the error that comes of it stands beside the one that was predicted, and the share of the
+//! drives in which the parameter is called identified beside the length at which 95 % do.
 //!
 //! Terms: a *form* of the probe is none, one sine, or one sine in the first half and another in the second.
 
 use haptic_analysis::identify::{DriveLog, INFORMED, Information, Options, identify_together, information};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{PublishedDriver, participant};
+use haptic_sim::share::wilson;
 use serde::Serialize;
 
 use crate::Away;
@@ -77,6 +79,10 @@ pub struct Confirmation {
     pub rms: f64,
     /// Share of the 95 % intervals that hold the truth.
     pub coverage: f64,
+    /// Fits that call the parameter identified.
+    pub identified: usize,
+    /// Wilson's 95 % interval of the share of drives that do.
+    pub identified_share: [f64; 2],
 }
 
 /// Every design with its errors, and the best one.
@@ -92,12 +98,19 @@ pub struct DesignResult {
     pub best: Option<usize>,
     /// What driving it gave.
     pub confirmation: Option<Confirmation>,
+    /// The shortest length tried at which the parameter is identified in 95 % of the fits; none if none up to half an hour is.
+    pub for_most: Option<Confirmation>,
 }
 
 /// Longest drive that is worth proposing, s: two hours.
 const LONGEST_S: f64 = 7200.0;
 /// Shortest record that an identification takes, s, with some room.
 const SHORTEST_S: f64 = 20.0;
+/// Share of the drives that are to name a value, and the longest drive that is tried for it, s.
+const MOST: f64 = 0.95;
+const LONGEST_TRIED_S: f64 = 1800.0;
+/// Factor from one length that is tried to the next.
+const PACE: f64 = 1.5;
 
 /// A participant's information on one course with one probe.
 struct Cell {
@@ -170,19 +183,47 @@ pub fn design(request: &DesignRequest, watch: &Watch<'_>) -> Result<DesignResult
     let best = (0..designs.len())
         .filter(|&i| length(&designs[i]) <= LONGEST_S)
         .min_by(|&a, &b| length(&designs[a]).total_cmp(&length(&designs[b])));
-    let confirmation = match best {
-        Some(best) if request.confirmations > 0 => {
-            Some(confirm(request, place, &designs[best], &drivers, watch)?)
-        }
-        _ => None,
-    };
+    let (mut confirmation, mut most) = (None, None);
+    if let Some(best) = best.filter(|_| request.confirmations > 0) {
+        let best = &designs[best];
+        let length_s = best.needed_s.unwrap_or(best.span_s).max(SHORTEST_S);
+        let tried = |length_s| confirm(request, place, (best, length_s), &drivers, watch);
+        let first = tried(length_s)?;
+        most = for_most(&first, tried)?;
+        confirmation = Some(first);
+    }
     Ok(DesignResult {
         parameter: request.parameter.clone(),
         error: request.error,
         designs,
         best,
         confirmation,
+        for_most: most,
     })
+}
+
+/// The shortest of the lengths tried, from the first one down or up, that names a value in most drives.
+fn for_most(
+    first: &Confirmation,
+    tried: impl Fn(f64) -> Result<Confirmation, StudyError>,
+) -> Result<Option<Confirmation>, StudyError> {
+    let does = |c: &Confirmation| c.identified as f64 >= MOST * c.fits as f64;
+    let mut found = does(first).then(|| first.clone());
+    let up = found.is_none();
+    let mut length_s = first.length_s;
+    loop {
+        length_s = if up { length_s * PACE } else { length_s / PACE };
+        if !(SHORTEST_S..=LONGEST_TRIED_S).contains(&length_s) {
+            return Ok(found);
+        }
+        let next = tried(length_s)?;
+        match (does(&next), up) {
+            (true, true) => return Ok(Some(next)),
+            (true, false) => found = Some(next),
+            (false, true) => {}
+            (false, false) => return Ok(found),
+        }
+    }
 }
 
 fn drivers(numbers: &[u32]) -> Result<Vec<(u32, PublishedDriver)>, StudyError> {
@@ -284,16 +325,15 @@ fn needed(request: &DesignRequest, place: usize, all: &[Information]) -> Option<
     Some(high)
 }
 
-/// Drives the design and identifies.
+/// Drives the design for so long, s, and identifies.
 fn confirm(
     request: &DesignRequest,
     place: usize,
-    design: &Design,
+    (design, length_s): (&Design, f64),
     drivers: &[(u32, PublishedDriver)],
     watch: &Watch<'_>,
 ) -> Result<Confirmation, StudyError> {
     let course = request.courses.iter().find(|c| c.name() == design.course);
-    let length_s = design.needed_s.unwrap_or(design.span_s).max(SHORTEST_S);
     let jobs: Vec<(u32, PublishedDriver, u64)> = drivers
         .iter()
         .flat_map(|&(number, driver)| (0..u64::from(request.confirmations)).map(move |r| (number, driver, r)))
@@ -338,15 +378,18 @@ fn confirm(
         let held = p
             .interval_95
             .is_none_or(|[low, high]| low <= truth && truth <= high);
-        Ok((off, held, promised))
+        Ok((off, held, promised, p.identified))
     })?;
     let count = found.len() as f64;
+    let identified = found.iter().filter(|x| x.3).count();
     Ok(Confirmation {
         fits: found.len(),
         length_s,
         predicted: rms(found.iter().map(|x| x.2)).unwrap_or(f64::NAN),
         rms: rms(found.iter().map(|x| x.0)).unwrap_or(f64::NAN),
         coverage: found.iter().filter(|x| x.1).count() as f64 / count,
+        identified,
+        identified_share: wilson(identified as f64 / count, count),
     })
 }
 

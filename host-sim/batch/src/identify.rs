@@ -127,9 +127,11 @@ pub fn identify_several(
 pub struct Drivers {
     /// Name of the drive and what was made of it.
     pub drivers: Vec<(String, Identification)>,
-    /// Differences of two drivers, the first less the second; empty otherwise.
+    /// Names of the two who are compared: those of two whose models are not refuted, where there are just two; empty otherwise.
+    pub compared: Vec<String>,
+    /// Their differences, the first less the second; empty otherwise.
     pub differences: Vec<Difference>,
-    /// What a group of three drivers or more is like; empty otherwise.
+    /// What a group of three drivers or more is like; empty of fewer whose models are not refuted.
     pub population: Vec<Population>,
 }
 
@@ -155,12 +157,21 @@ pub fn compare_drivers(
         let each = of.iter().enumerate();
         each.max_by_key(|(_, d)| d.1.rows).map_or(0, |(i, _)| i)
     };
-    let fits: Vec<&Identification> = found.iter().filter_map(|d| Some(&d.get(longest(d))?.1)).collect();
-    let (differences, population) = match fits[..] {
-        [first, second] => (differences(first, second), Vec::new()),
-        _ => (Vec::new(), population(&fits)),
+    let all: Vec<&(String, Identification)> = found.iter().filter_map(|d| d.get(longest(d))).collect();
+    let stands = |d: &&&(String, Identification)| d.1.refuted.is_empty();
+    let pair: Vec<_> = all.iter().filter(stands).copied().collect();
+    let (compared, differences, population) = match pair[..] {
+        [first, second] => {
+            let names = vec![first.0.clone(), second.0.clone()];
+            (names, differences(&first.1, &second.1), Vec::new())
+        }
+        _ => {
+            let fits: Vec<&Identification> = all.iter().map(|d| &d.1).collect();
+            (Vec::new(), Vec::new(), population(&fits))
+        }
     };
     Ok(Drivers {
+        compared,
         drivers: found.into_iter().flatten().collect(),
         differences,
         population,

@@ -25,6 +25,10 @@ pub(super) struct Arguments {
     /// A known parameter, the same for all; as for identify
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
+    /// The column has a power assist that is not in guidance_torque_nm: it turns the wheel with the driver, so that the torques on the
+    /// column do not tell whether driver_torque_nm is recorded too small
+    #[arg(long)]
+    assisted: bool,
     /// Estimate what is otherwise taken as known; as for identify
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
@@ -36,6 +40,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let mut options = Options::given(arguments.manual, &arguments.fix)?;
+    options.assisted = arguments.assisted;
     for what in &arguments.estimate {
         options.estimate(what)?;
     }

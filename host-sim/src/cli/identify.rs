@@ -37,6 +37,10 @@ pub(super) struct Arguments {
     /// 300 m at 60 km/h; wheel_inertia); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
+    /// The column has a power assist that is not in guidance_torque_nm: it turns the wheel with the driver, so that the torques on the
+    /// column do not tell whether driver_torque_nm is recorded too small
+    #[arg(long)]
+    assisted: bool,
     /// Estimate what is otherwise taken as known: k_nms, t_nms, t_h_late, t_d_late, in a range if one is given, such as
     /// t_nms=0.06..0.15; may be repeated
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
@@ -68,6 +72,7 @@ enum MethodArgument {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let mut options = Options::given(arguments.manual, &arguments.fix)?;
+    options.assisted = arguments.assisted;
     for what in &arguments.estimate {
         options.estimate(what)?;
     }

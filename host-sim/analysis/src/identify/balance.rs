@@ -10,6 +10,9 @@
 //! the motion tells nothing of the torques. So where there is friction, only the rows count in which the wheel slides for
 //! as long as the low-pass remembers.
 //!
+//! Gusts and an unsteady road turn the wheel too, and the torques answer to that: what is left unexplained is then no noise, and only
+//! signs are told (`verdict`). A power assist turns it with the driver: T_d then acts at more than its scale.
+//!
 //! What it cannot see: a scale that T_d and T_h share, a delay that all three share, and the camera. A column
 //! that does not answer so (a servo that is not in T_h) leaves much unexplained; then nothing is said. Nor is
 //! anything where the speed changes: the vehicle's answer is one at one speed.
@@ -68,6 +71,9 @@ pub struct Balance {
     pub(crate) offset_nm: [f64; 2],
     /// Seconds that all this rests on.
     pub seconds: f64,
+    /// Steps of the wheel angle's sensor, rad, where most rows bring no other angle; else 0.
+    #[serde(skip)]
+    pub(crate) angle_step_rad: f64,
 }
 
 /// A signal and its derivatives through the low-pass.
@@ -192,6 +198,17 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
     weighed(log, &rows, manual, &turning)
 }
 
+/// The usual step of an angle that most rows do not change; else 0.
+fn step_of(angle: &[f64], rows: &[usize]) -> f64 {
+    let change = |&k: &usize| (angle[k] - angle[k.saturating_sub(1)]).abs();
+    let mut changes: Vec<f64> = rows.iter().map(change).filter(|c| *c > 1e-9).collect();
+    if changes.is_empty() || 2 * changes.len() > rows.len() {
+        return 0.0;
+    }
+    let middle = changes.len() / 2;
+    *changes.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// The balance over `rows`.
 fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Option<Balance> {
     let dt = log.dt_s;
@@ -258,6 +275,7 @@ fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Opt
             friction_nm: Some([fit.weights[d - 1], error(d - 1)]),
             offset_nm: [fit.weights[d - 2], error(d - 2)],
             seconds: rows.len() as f64 * dt,
+            angle_step_rad: step_of(&log.wheel_angle_rad, rows),
         });
         if driver_late.abs() > 0.3 || guidance_late.abs() > 0.3 || (step.abs() < 5e-4 && more.abs() < 5e-4) {
             break;

@@ -25,6 +25,8 @@ pub struct Options {
     pub line: [Option<f64>; 2],
     /// Inertia of the wheel above a torsion bar that measured T_d, kg.m2; none where T_d is the torque of the hands.
     pub wheel_inertia: Option<f64>,
+    /// Whether a power assist that is not in T_h turns the wheel with the driver.
+    pub assisted: bool,
     /// Known a_1, a_2, a_3.
     pub a: [Option<f64>; 3],
     /// Known (K_d + K_nms)*a_i.
@@ -64,6 +66,7 @@ impl Default for Options {
             k_nms_known: false,
             line: [None; 2],
             wheel_inertia: None,
+            assisted: false,
             a: [None; 3],
             gain: [None; 3],
             t_p_s: None,

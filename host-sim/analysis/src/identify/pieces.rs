@@ -7,7 +7,7 @@
 
 use serde::Serialize;
 
-use super::change::{Change, SHORTEST_S};
+use super::change::{Change, Constancy, SHORTEST_S};
 use super::log::DriveLog;
 use super::noise_model::identify_prepared;
 use super::options::Options;
@@ -21,6 +21,9 @@ pub struct Piece {
     pub from_s: f64,
     /// Until when, s.
     pub to_s: f64,
+    /// Whether it would show changes such as those between the pieces, in nine of ten drives: a piece that would not is not told to be
+    /// of one driver.
+    pub shows_such_changes: bool,
     /// The driver in it.
     #[serde(flatten)]
     pub identification: Identification,
@@ -60,13 +63,23 @@ pub fn identify_in_pieces(log: &DriveLog, options: &Options) -> Pieces {
     }
     let from = std::iter::once(start_s).chain(changes.iter().map(|c| c.within_s()[1]));
     let to = changes.iter().map(|c| c.within_s()[0]).chain([end_s]);
-    Pieces {
-        pieces: from
-            .zip(to)
-            .filter_map(|(from, to)| whole.piece([from, to]))
-            .collect(),
-        changes,
+    let mut pieces: Vec<Piece> = from
+        .zip(to)
+        .filter_map(|(from, to)| whole.piece([from, to]))
+        .collect();
+    for piece in &mut pieces {
+        piece.shows_such_changes = changes
+            .iter()
+            .all(|c| shows(piece.identification.constancy.as_ref(), c));
     }
+    Pieces { pieces, changes }
+}
+
+/// Whether a record would show such a change as a step in its middle.
+fn shows(found: Option<&Constancy>, change: &Change) -> bool {
+    let power = found.iter().flat_map(|c| &c.power);
+    let mut same = power.filter(|p| p.parameter == change.parameter);
+    same.any(|p| p.step.is_some_and(|least| least <= change.by.abs()))
 }
 
 struct Whole<'a> {
@@ -81,6 +94,7 @@ impl Whole<'_> {
         (part.preflight.used_s >= SHORTEST_S).then(|| Piece {
             from_s,
             to_s,
+            shows_such_changes: true,
             identification: identify_prepared(&part, self.options),
         })
     }
@@ -116,5 +130,47 @@ impl Prepared {
         part.stretches.retain(|s| s.start < s.end);
         part.preflight.used_s = part.stretches.iter().map(|s| s.len() as f64 * dt_s).sum();
         part
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::change::{Power, Shape};
+
+    #[test]
+    fn a_piece_shows_what_is_no_smaller_than_its_power() {
+        let found = |step| Constancy {
+            deviance: 2.0,
+            level: 16.0,
+            power: vec![Power {
+                parameter: "k_hg",
+                step,
+                blip: None,
+            }],
+            change: None,
+        };
+        let change = |parameter, by| Change {
+            parameter,
+            shape: Shape::Step,
+            at_s: [60.0; 2],
+            at_95_s: [[59.0, 61.0]; 2],
+            by,
+            deviance: 40.0,
+        };
+        for (least, by, shown) in [
+            (0.2, 0.3, true),
+            (0.2, -0.3, true),
+            (0.2, 0.1, false),
+            (0.2, -0.1, false),
+        ] {
+            assert_eq!(
+                shows(Some(&found(Some(least))), &change("k_hg", by)),
+                shown,
+                "{least} {by}"
+            );
+        }
+        assert!(!shows(Some(&found(None)), &change("k_hg", 0.9)));
+        assert!(!shows(Some(&found(Some(0.1))), &change("t_p", 0.9)));
     }
 }

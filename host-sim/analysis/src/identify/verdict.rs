@@ -7,17 +7,26 @@
 
 use super::balance::Balance;
 use super::change::{Change, E_Y, SHORTEST_S, T_D};
-use super::result::{InputCorrelation, Refutation, SAME_DRIVER, SAME_LINE, Whiteness};
+use super::result::{InputCorrelation, Parameter, Refutation, SAME_DRIVER, SAME_LINE, Whiteness};
 
 /// Standard errors beyond which a difference is certain, with all the tests that are made of one record.
 pub(crate) const CERTAIN: f64 = 5.0;
 /// Explained share of T_d above which the column's balance of torques is seen to hold.
 pub(crate) const BALANCE_SEEN: f64 = 0.8;
+/// The share above which it tells scales and instants too: gusts of 250 N leave 87 % and make a scale of 0.2 of a right one, a motor's
+/// ripple of 0.06 N.m leaves 98.8 % and makes one of 0.78, and without them it is more than 99.5 %.
+pub(crate) const BALANCE_CLOSE: f64 = 0.99;
 /// Differences of scale and of delay, s, that are too small to matter.
 const SMALL_SCALE: f64 = 0.1;
-/// How far a scale may be off beside dry friction: with 0.5 N.m of it that gives way over 0.2 degrees, right logs come out at 0.82 to 0.87.
+/// How far a scale may be off beside so much dry friction, N.m, and more, and in proportion beside less: with 0.5 N.m that gives way over
+/// 0.2 degrees, right logs come out at 0.82 to 0.87.
 const SMALL_SCALE_BESIDE_FRICTION: f64 = 0.3;
+const MUCH_FRICTION_NM: f64 = 0.25;
+/// A driver has at least this gain on e_theta, N.m/rad: half of what table 4's least a_3 and K_d make.
+const LEAST_GAIN_3: f64 = 3.0;
 const SMALL_DELAY_S: f64 = 0.0045;
+/// Steps of the wheel angle's sensor up to which that holds, rad; with coarser ones delays are told as much more coarsely.
+const FINE_ANGLE_RAD: f64 = 0.1 / 180.0 * std::f64::consts::PI;
 /// How late T_d may be against the wheel angle, which moves t_p alone: less is not told from the column's own lags.
 const SMALL_DRIVER_DELAY_S: f64 = 0.015;
 /// Largest autocorrelation of residuals, beyond that of resampling, that leaves the noise model standing: more is another
@@ -35,13 +44,14 @@ pub(crate) const SIGNS: &str = "all torques and angles are positive to the left"
 /// The assumption that a sensor that changed refutes.
 const SAME_SENSORS: &str = "the sensors are the same throughout";
 /// What the balance of torques on the column refutes.
-pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
+pub(crate) fn of_balance(b: &Balance, assisted: bool) -> Vec<Refutation> {
     if b.explained < BALANCE_SEEN {
         return Vec::new();
     }
-    let signs_and_scale = of_signs_and_scale(b).into_iter();
+    let is_told = |r: &Refutation| r.assumption == SIGNS || b.explained >= BALANCE_CLOSE;
+    let signs_and_scale = of_signs_and_scale(b, assisted).into_iter().filter(is_told);
     // Before it slides, friction gives way like a spring: that looks like a delay.
-    let instants = if b.friction_nm.is_some() {
+    let instants = if b.friction_nm.is_some() || b.explained < BALANCE_CLOSE {
         Vec::new()
     } else {
         of_instants(b)
@@ -62,9 +72,13 @@ fn balance_evidence(b: &Balance, what: &str) -> String {
 }
 
 /// A channel with a swapped sign or another scale; at most one, in the order of precedence.
-fn of_signs_and_scale(b: &Balance) -> Option<Refutation> {
+fn of_signs_and_scale(b: &Balance, assisted: bool) -> Option<Refutation> {
     let small = match b.friction_nm {
-        Some(_) => SMALL_SCALE_BESIDE_FRICTION,
+        Some([friction_nm, _]) => {
+            // No more than that much friction is known to bias.
+            let share = (friction_nm / MUCH_FRICTION_NM).clamp(0.0, 1.0);
+            SMALL_SCALE + share * (SMALL_SCALE_BESIDE_FRICTION - SMALL_SCALE)
+        }
         None => SMALL_SCALE,
     };
     let negative = b.stiffness[0] < 0.0 && is_sure(b.stiffness[0], b.stiffness[1]);
@@ -104,16 +118,48 @@ fn of_signs_and_scale(b: &Balance) -> Option<Refutation> {
             cause: "driver_torque_nm is the sum T_d + T_h (a sensor below the actuator)".to_owned(),
             cure: "subtract guidance_torque_nm from driver_torque_nm before".to_owned(),
         },
+        // Beside an assist it acts at more than its scale.
+        Some([s, _]) if assisted && s < 1.0 => return None,
         Some([s, e]) if is_sure(s - 1.0, e) && (s - 1.0).abs() > small => Refutation {
             assumption: "driver_torque_nm and guidance_torque_nm have one scale",
             evidence: balance_evidence(b, &format!("at {s:.3} +- {e:.3} times its scale")),
             cause: format!(
-                "driver_torque_nm is recorded at {s:.3} times its value (or guidance_torque_nm at {:.3} times)",
-                1.0 / s
+                "driver_torque_nm is recorded at {s:.3} times its value (or guidance_torque_nm at {:.3} times){}",
+                1.0 / s,
+                if s < 1.0 {
+                    ", or a power assist turns the wheel with the driver"
+                } else {
+                    ""
+                }
             ),
-            cure: format!("multiply driver_torque_nm by {:.3} in the log", 1.0 / s),
+            cure: format!(
+                "multiply driver_torque_nm by {:.3} in the log{}",
+                1.0 / s,
+                if s < 1.0 {
+                    "; --assisted for a column with a power assist"
+                } else {
+                    ""
+                }
+            ),
         },
         _ => return None,
+    })
+}
+
+/// Nobody steers by where the road goes: a gain on e_theta that is surely none of a driver's.
+pub(crate) fn of_gain_3(gain_3: &Parameter) -> Option<(f64, Refutation)> {
+    let (gain, error) = gain_3.optimum.zip(gain_3.standard_error)?;
+    let below = (LEAST_GAIN_3 - gain) / error;
+    (below > CERTAIN).then(|| {
+        let refutation = Refutation {
+            assumption: "the driver steers by e_theta_rad",
+            evidence: format!(
+                "gain_3 is {gain:.2} +- {error:.2} N.m/rad, and that of drivers {LEAST_GAIN_3} N.m/rad at least"
+            ),
+            cause: "e_theta_rad is another signal (e_y_m, say), or is not what the driver sees".to_owned(),
+            cure: "check the columns e_y_m and e_theta_rad".to_owned(),
+        };
+        (below * below, refutation)
     })
 }
 
@@ -132,14 +178,15 @@ fn of_instants(b: &Balance) -> Vec<Refutation> {
             cure: format!("--fix {option}={value:.4}, or --estimate {option}"),
         });
     };
+    let coarse = (b.angle_step_rad / FINE_ANGLE_RAD).max(1.0);
     let [driver, error] = b.driver_late_s;
-    let driver_is = is_sure(driver, error) && driver.abs() > SMALL_DRIVER_DELAY_S;
+    let driver_is = is_sure(driver, error) && driver.abs() > SMALL_DRIVER_DELAY_S * coarse;
     if driver_is {
         late("driver_torque_nm", "wheel_angle_rad", "t_d_late", b.driver_late_s);
     }
     if let Some([value, error]) = b.between_s.filter(|_| !driver_is)
         && is_sure(value, error)
-        && value.abs() > SMALL_DELAY_S
+        && value.abs() > SMALL_DELAY_S * coarse
     {
         // A sensor is never early: of the two, the other one is late.
         if value > 0.0 {
@@ -161,18 +208,19 @@ fn of_instants(b: &Balance) -> Vec<Refutation> {
     out
 }
 
-/// What the residuals refute, each with what it adds to twice the log likelihood.
+/// What the residuals refute, each with what it adds to twice the log likelihood. Of a torque of which a share was `bridged`, the
+/// prediction errors of as many rows are made of their neighbours'.
 pub(crate) fn of_residuals(
     fit_percent: f64,
     white: &Whiteness,
     inputs: &[InputCorrelation],
-    unexplained_autocorrelation: f64,
+    [unexplained_autocorrelation, bridged]: [f64; 2],
 ) -> Vec<(f64, Refutation)> {
     let mut out = Vec::new();
     if fit_percent > ALL_BUT_PERFECT {
         return out;
     }
-    if white.p_value < 1e-6 && unexplained_autocorrelation.abs() > WHITE_ENOUGH {
+    if white.p_value < 1e-6 && unexplained_autocorrelation.abs() > WHITE_ENOUGH + bridged {
         let refutation = Refutation {
             assumption: "the disturbance is a low-passed remnant and white sensor noise",
             evidence: format!(
@@ -267,7 +315,7 @@ pub(crate) fn of_changed_sensor(
     record: [f64; 2],
     [before, after]: [&Balance; 2],
 ) -> Option<Refutation> {
-    if before.explained.min(after.explained) < BALANCE_SEEN {
+    if before.explained.min(after.explained) < BALANCE_CLOSE {
         return None;
     }
     let moved = |[was, error_was]: [f64; 2], [is, error]: [f64; 2]| {
@@ -309,6 +357,60 @@ pub(crate) const ASSUMED: [&str; 5] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_driver_looks_ahead() {
+        let gain = |gain, error| Parameter {
+            optimum: Some(gain),
+            standard_error: Some(error),
+            ..Parameter::ABSENT
+        };
+        for (of, told) in [
+            ((0.16, 0.14), true),
+            ((0.16, 0.7), false),
+            ((9.0, 0.5), false),
+            ((-20.0, 3.0), true),
+        ] {
+            assert_eq!(of_gain_3(&gain(of.0, of.1)).is_some(), told, "{of:?}");
+        }
+    }
+
+    /// A scale of 0.8 in a calm balance is told, but beside an assist, which makes one; a scale of 1.2 is told with an assist too. Of a
+    /// balance that explains 90 % a swapped sign is told, and neither scale nor delay; a delay of 8 ms is within what steps of 0.2
+    /// degrees leave open.
+    #[test]
+    fn a_balance_tells_as_much_as_it_explains() {
+        let balance = |explained, scale, step_deg: f64| Balance {
+            explained,
+            scale: Some([scale, 0.01]),
+            between_s: Some([0.008, 0.0005]),
+            stiffness: [3.0, 0.1],
+            angle_step_rad: step_deg.to_radians(),
+            ..Balance::default()
+        };
+        let told = |b: Balance, assisted| of_balance(&b, assisted).len();
+        assert_eq!(
+            [
+                told(balance(0.995, 0.8, 0.1), false),
+                told(balance(0.995, 0.8, 0.1), true)
+            ],
+            [2, 1]
+        );
+        assert_eq!(
+            [
+                told(balance(0.995, 1.2, 0.2), false),
+                told(balance(0.995, 1.2, 0.2), true)
+            ],
+            [1, 1]
+        );
+        assert_eq!(
+            [
+                told(balance(0.9, 0.8, 0.1), false),
+                told(balance(0.9, -0.8, 0.1), true)
+            ],
+            [0, 1]
+        );
+    }
 
     /// Of a record of 200 s, a part of 10 s at least can be fitted.
     #[test]

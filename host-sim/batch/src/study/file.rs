@@ -118,7 +118,12 @@ fn session(
             Subject::Simulated
         }
         (None, Some(given), false) => {
-            put_driver(given.clone());
+            let mut given = given.clone();
+            if manual {
+                // There is nothing to resist.
+                given.remove("k_hg");
+            }
+            put_driver(given);
             Subject::Simulated
         }
         _ => return Err(bad("one of published, driver and person = true is wanted".into())),

@@ -10,8 +10,10 @@
 //! - [`Study::results`]: what is recorded, measured, and what is not there yet.
 
 mod file;
+mod guidance;
 mod order;
 mod paired;
+mod repeated;
 mod store;
 #[cfg(test)]
 mod tests;
@@ -25,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 pub use order::Order;
 pub use paired::{Difference, of_participants};
+pub use repeated::{Repeated, Test};
 
 use crate::engine::{Watch, each, runs};
 use crate::error::{StudyError, refuse};
@@ -127,6 +130,9 @@ pub struct StudyResults {
     pub level: Confidence,
     /// How much the conditions differ, participant by participant.
     pub differences: Vec<Difference>,
+    /// Whether three or more conditions differ at all, metric by metric; empty of fewer.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub repeated: Vec<Repeated>,
     /// What a reader has to know.
     pub notes: Vec<String>,
 }
@@ -292,6 +298,7 @@ impl Study {
             conditions: self.conditions.clone(),
             level,
             differences: paired::differences(&self.conditions, &sessions, level),
+            repeated: repeated::repeated(&self.conditions, &sessions),
             sessions,
             notes,
         })

@@ -13,7 +13,7 @@ use haptic_sim::scenario::{Condition, Scenario};
 use haptic_sim::simulation::{Ending, Run};
 use serde::{Deserialize, Serialize};
 
-use super::{Session, Source, Study};
+use super::{Session, Source, Study, guidance};
 use crate::error::{StudyError, refuse};
 use crate::record::{RunRecord, default_window};
 
@@ -137,7 +137,11 @@ pub(super) fn import(
     let trace = Trace::read_csv(csv).map_err(|e| InputError::new(file.display(), e))?;
     let checked = check(session, &trace)
         .and_then(|()| check_hands(&trace))
-        .and_then(|()| check_road(session, &trace));
+        .and_then(|()| check_road(session, &trace))
+        .and_then(|()| match session.scenario.condition() {
+            Condition::Manual => Ok(()),
+            _ => guidance::check(session, &trace),
+        });
     checked.map_err(|e| InputError::new(file.display(), e))?;
     keep(study, session, out, csv, Source::Imported, false)
 }

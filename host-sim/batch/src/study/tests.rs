@@ -29,7 +29,7 @@ name = "P01"
 published = 3
 [[participant]]
 name = "P02"
-driver = { t_p_s = 0.3, remnant_sd_nm = 0.05 }
+driver = { t_p_s = 0.3, remnant_sd_nm = 0.05, k_hg = 0.4 }
 [[participant]]
 name = "P03"
 person = true
@@ -59,6 +59,10 @@ fn a_session_is_the_run_of_its_scenario() {
     assert_eq!(recorded, [true, true, true, true, false, false]);
     let seeds: std::collections::BTreeSet<u64> = results.sessions.iter().map(|s| s.seed).collect();
     assert_eq!(seeds.len(), 6);
+    // A driver of the file has K_hg where there is guidance to resist, and no more.
+    let own =
+        [&study.sessions[2], &study.sessions[3]].map(|s| (s.condition.as_str(), s.scenario.gains().k_hg));
+    assert_eq!(own, [("guided", 0.4), ("manual", 0.0)]);
     let session = &study.sessions[1];
     assert_eq!(
         (session.scenario.driver().t_p, session.scenario.gains().k_hg > 0.0),
@@ -146,6 +150,12 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
     };
     let guided = file("drive.csv", &|s| s.clone());
     let fast = file("fast.csv", &|s| s.to_builder().speed_kmh(80.0).build().unwrap());
+    let unprobed = file("unprobed.csv", &|s| s.to_builder().probe(false).build().unwrap());
+    let strong = file("strong.csv", &|s| {
+        let mut guidance = *s.guidance();
+        guidance.controller.k_1 *= 2.0;
+        s.to_builder().guidance(guidance).build().unwrap()
+    });
     let short = out.path().join("short.csv");
     let text = fs::read_to_string(&guided).unwrap();
     fs::write(&short, text.lines().take(200).collect::<Vec<_>>().join("\n")).unwrap();
@@ -170,6 +180,12 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
             &guided,
             "driven with guidance, and condition manual is without guidance",
         ),
+        (
+            "P03/guided",
+            &unprobed,
+            "N.m at 2.5 Hz, and condition guided has one of 0.200 N.m",
+        ),
+        ("P03/guided", &strong, "times the guidance of condition guided"),
         ("P03/guided", &short, "it lasts 1.0 s"),
         (
             "P03/guided",

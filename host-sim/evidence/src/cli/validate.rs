@@ -1,13 +1,22 @@
 //! `cargo xtask validate`: the estimates of `identify` and `identify-vehicle` against drivers and vehicles whose truth is known.
 
+use std::path::PathBuf;
+
 use crate::reports::validation::Validation;
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
-use haptic_evidence::estimates::{POPULATION, changes, corruptions, methods, recordings, repeat};
+use haptic_batch::engine::{self, Watch};
+use haptic_batch::experiment::ExperimentPlan;
+use haptic_evidence::estimates::{
+    POPULATION, RandomDrive, RandomPlan, changes, corruptions, methods, recordings, repeat, resumed_random,
+};
 use haptic_evidence::vehicle::coverage;
 use haptic_log::near::did_you_mean;
 
+use host_sim::cli::checkpoint::Checkpoint;
+use host_sim::cli::output;
 use host_sim::cli::participants::Drives;
+use host_sim::cli::progress::Threads;
 use host_sim::cli::results::ResultArguments;
 use host_sim::cli::{BadInput, Outcome, progress};
 
@@ -41,11 +50,29 @@ pub(crate) struct Arguments {
     /// if in the first two worlds those of a quantity surely hold it in fewer than 90 % (20 drives or more tell)
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["participant", "probe"])]
     vehicles: Option<u32>,
+    /// Compose N drives by chance (sensors, sampling, vehicle, column, driver, road, guidance, time; two or three at once), every
+    /// second with honest conditions alone, and count wrong values and honest logs that are accused, each listed. Drive K of a seed
+    /// is the same in every run. Exit code 1 if more than 1 of 1,000 values is wrong, or more than 2 of 100 honest logs are accused
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    random: Option<u32>,
+    /// These drives of --random alone, by number, separated by commas; with --out their logs are left there, as drive-K.csv
+    #[arg(
+        long = "drives",
+        value_delimiter = ',',
+        value_name = "K,...",
+        requires = "random"
+    )]
+    only_drives: Vec<u32>,
+    /// Keep every drive of --random in FILE as soon as it is done; a run with the same FILE goes on from there, with a larger N too
+    #[arg(long, value_name = "FILE", requires = "random")]
+    checkpoint: Option<PathBuf>,
     /// Only those of --corruptions and --changes whose name holds this
-    #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings", "vehicles"])]
+    #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings", "vehicles", "random"])]
     only: String,
     #[command(flatten)]
     drives: Drives,
+    #[command(flatten)]
+    threads: Threads,
     #[command(flatten)]
     results: ResultArguments,
 }
@@ -58,34 +85,95 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         let near = did_you_mean(&arguments.only, names.iter().copied());
         return Err(format!("--only {:?}: none of {}{near}", arguments.only, names.join("; ")).into());
     }
-    let output = arguments.results.begin("validate")?;
-    let questions = [
-        arguments.coverage,
-        arguments.corruptions,
-        arguments.methods,
-        arguments.changes,
-        arguments.recordings,
-        arguments.vehicles,
-    ];
-    let seeds = questions.into_iter().flatten().next().unwrap_or(1);
-    let result = progress::watched("drives", |watch| -> Result<_, StudyError> {
-        Ok(if arguments.coverage.is_some() {
-            Validation::Coverage(repeat(&plan, seeds, watch)?)
-        } else if arguments.corruptions.is_some() {
-            Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, watch)?))
-        } else if arguments.changes.is_some() {
-            Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, watch)?))
-        } else if arguments.recordings.is_some() {
-            Validation::Recordings(Box::new(recordings(&plan, seeds, watch)?))
-        } else if let Some(seeds) = arguments.vehicles {
-            Validation::Vehicles(coverage(u64::from(seeds), plan.seed, watch)?)
-        } else {
-            Validation::Methods(methods(&plan, seeds, watch)?)
-        })
-    })?;
+    let logs: Vec<String> = arguments
+        .only_drives
+        .iter()
+        .map(|k| format!("drive-{k}.csv"))
+        .collect();
+    let kept: Vec<&str> = logs.iter().map(String::as_str).collect();
+    let output = arguments.results.begin_beside("validate", &kept)?;
+    let record = OnRecord::open(arguments, &plan)?;
+    let answer = || progress::watched("drives", |watch| arguments.answer(&plan, &record, watch));
+    let result = arguments.threads.run(answer)??;
     let broken = result.broken();
     for line in &broken {
         eprintln!("NOT KEPT: {line}");
     }
+    if let Some(place) = output.place() {
+        let plan = RandomPlan {
+            plan,
+            numbers: Vec::new(),
+        };
+        for (number, name) in arguments.only_drives.iter().zip(&logs) {
+            std::fs::write(place.join(name), plan.log_of(*number)?)?;
+        }
+    }
     output.show(&result.report(), &result, broken.is_empty())
+}
+
+/// Random drives that an earlier run did, and where new ones go.
+struct OnRecord {
+    checkpoint: Option<Checkpoint>,
+    drives: Vec<RandomDrive>,
+}
+
+impl OnRecord {
+    fn open(arguments: &Arguments, plan: &ExperimentPlan) -> Result<Self, BadInput> {
+        let Some(path) = &arguments.checkpoint else {
+            return Ok(Self {
+                checkpoint: None,
+                drives: Vec::new(),
+            });
+        };
+        // Another program drives others.
+        let provenance = haptic_report::document::Provenance::new(None);
+        let heading = serde_json::json!({ "study": "random drives", "plan": plan, "provenance": provenance });
+        let (checkpoint, drives) = Checkpoint::open(path, &serde_json::to_string(&heading)?)?;
+        output::keeps(path, "drive")?;
+        Ok(Self {
+            checkpoint: Some(checkpoint),
+            drives,
+        })
+    }
+}
+
+impl Arguments {
+    fn answer(
+        &self,
+        plan: &ExperimentPlan,
+        record: &OnRecord,
+        watch: &Watch<'_>,
+    ) -> Result<Validation, StudyError> {
+        Ok(if let Some(drives) = self.coverage {
+            Validation::Coverage(repeat(plan, drives, watch)?)
+        } else if let Some(drives) = self.corruptions {
+            Validation::Corruptions(Box::new(corruptions(plan, drives, &self.only, watch)?))
+        } else if let Some(drives) = self.changes {
+            Validation::Changes(Box::new(changes(plan, drives, &self.only, watch)?))
+        } else if let Some(drives) = self.recordings {
+            Validation::Recordings(Box::new(recordings(plan, drives, watch)?))
+        } else if let Some(drives) = self.vehicles {
+            Validation::Vehicles(coverage(u64::from(drives), plan.seed, watch)?)
+        } else if let Some(drives) = self.random {
+            let numbers = match self.only_drives.as_slice() {
+                [] => (0..drives).collect(),
+                some => some.to_vec(),
+            };
+            let plan = RandomPlan {
+                plan: plan.clone(),
+                numbers,
+            };
+            let keep = |drive: &RandomDrive| match &record.checkpoint {
+                Some(checkpoint) => Ok(checkpoint.add(drive)?),
+                None => Ok(()),
+            };
+            Validation::Random(Box::new(engine::run(
+                &plan,
+                &resumed_random(&record.drives, keep),
+                watch,
+            )?))
+        } else {
+            Validation::Methods(methods(plan, self.methods.unwrap_or(1), watch)?)
+        })
+    }
 }

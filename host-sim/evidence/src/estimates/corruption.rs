@@ -200,7 +200,7 @@ fn corrupt(log: &mut DriveLog, way: Corruption, random: &mut Xoshiro256PlusPlus)
     }
 }
 
-fn noise(signal: &mut [f64], sd: f64, hold: usize, random: &mut Xoshiro256PlusPlus) {
+pub(super) fn noise(signal: &mut [f64], sd: f64, hold: usize, random: &mut Xoshiro256PlusPlus) {
     let Ok(normal) = Normal::new(0.0, sd) else { return };
     let mut held = 0.0;
     for (k, x) in signal.iter_mut().enumerate() {
@@ -211,7 +211,7 @@ fn noise(signal: &mut [f64], sd: f64, hold: usize, random: &mut Xoshiro256PlusPl
     }
 }
 
-fn delay(signal: &mut [f64], rows: f64) {
+pub(super) fn delay(signal: &mut [f64], rows: f64) {
     let original = signal.to_vec();
     for (k, x) in signal.iter_mut().enumerate() {
         let place = (k as f64 - rows).max(0.0);

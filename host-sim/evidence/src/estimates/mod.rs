@@ -2,6 +2,7 @@
 //!
 //! - [`repeat`]: whether intervals hold the truth as often as they say.
 //! - [`corruptions`], [`recordings`]: logs as real recorders leave them.
+//! - [`RandomPlan`]: drives that are composed by chance.
 //! - [`changes`]: what changes in mid-drive.
 //! - [`methods`]: ways to treat the camera's noise.
 //!
@@ -13,6 +14,7 @@ mod corruption;
 mod corruptions;
 mod kinds;
 mod methods;
+mod random;
 mod recordings;
 mod repetitions;
 
@@ -22,5 +24,6 @@ pub use corruption::{Corruption, POPULATION};
 pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
 pub use kinds::{KINDS, Kind};
 pub use methods::{METHODS, MethodLine, Methods, methods};
+pub use random::{ConditionLine, RandomDrive, RandomDrives, RandomPlan, Said, Share, Tally, resumed_random};
 pub use recordings::{CHANNELS, Channel, recordings};
 pub use repetitions::{Repeated, Repetitions, repeat};

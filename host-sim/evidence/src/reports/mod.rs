@@ -4,6 +4,7 @@ pub(crate) mod availability;
 mod changes;
 pub(crate) mod faults;
 pub(crate) mod handover;
+mod random;
 pub(crate) mod real_drives;
 pub(crate) mod reliance;
 pub(crate) mod validation;

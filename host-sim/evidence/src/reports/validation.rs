@@ -2,17 +2,18 @@
 
 use serde::Serialize;
 
-use super::changes;
+use super::{changes, random};
 use haptic_batch::experiment::ExperimentPlan;
 use haptic_evidence::estimates::{
-    Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
+    Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, RandomDrives, Repeated,
+    Repetitions,
 };
 use haptic_evidence::vehicle::VehicleCoverage;
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Panel, Series};
 use haptic_report::studies::place;
 
-/// One of the six questions that the validation asks, answered.
+/// One of the seven questions that the validation asks, answered.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Validation {
@@ -29,6 +30,8 @@ pub(crate) enum Validation {
     Recordings(Box<Corruptions>),
     /// Do the intervals of vehicles hold the truth as often as they say?
     Vehicles(VehicleCoverage),
+    /// Is anything wrong called identified, and an honest log accused, in drives that are composed by chance?
+    Random(Box<RandomDrives>),
 }
 
 impl Validation {
@@ -39,6 +42,7 @@ impl Validation {
             Self::Corruptions(result) | Self::Recordings(result) => result.broken.clone(),
             Self::Changes(result) => result.broken.clone(),
             Self::Methods(_) => Vec::new(),
+            Self::Random(result) => result.broken.clone(),
             Self::Vehicles(result) => super::vehicle::off_coverage(result),
         }
     }
@@ -76,6 +80,7 @@ impl Validation {
             Self::Changes(r) => format!("{}. {}", of_plan(r.drives, &r.plan), changes::summary(r)),
             Self::Methods(r) => format!("{}.", of_plan(r.seeds, &r.plan)),
             Self::Vehicles(r) => super::vehicle::coverage_summary(r),
+            Self::Random(r) => random::summary(r),
             Self::Recordings(r) => format!(
                 "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
                  between it and the hands; each lane line has noise of 2 cm where nothing else is said.",
@@ -96,6 +101,7 @@ impl Validation {
             Self::Changes(result) => vec![changes::table(result)],
             Self::Methods(result) => vec![methods_table(&result.lines)],
             Self::Vehicles(result) => vec![super::vehicle::coverage_table(result)],
+            Self::Random(result) => random::tables(result),
         }
     }
 
@@ -137,6 +143,12 @@ impl Validation {
                 "Do the 95 % intervals of vehicles hold the truth?",
                 "Share of the identified values whose 95 % interval holds the truth.",
             ),
+            Self::Random(_) => (
+                "random",
+                "Is anything wrong in drives that are composed by chance?",
+                "By condition, among whatever was beside it: wrong values of those that are called identified, and honest logs for \
+                 which the model is refuted.",
+            ),
         };
         let broken = self.broken().into_iter();
         let broken = broken.map(|line| Block::Text(format!("Not kept: {line}.")).on_page());
@@ -154,6 +166,7 @@ impl Validation {
             Self::Changes(result) => changes::figure(result),
             Self::Methods(result) => methods_figure(&result.lines),
             Self::Vehicles(result) => super::vehicle::coverage_figure(result),
+            Self::Random(result) => random::figure(result),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::ended;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::identify::{INFORMED, TABLE_4};
-use haptic_batch::design::{Design, DesignResult};
+use haptic_batch::design::{Confirmation, Design, DesignResult};
 
 /// The document of the answer.
 pub fn report(answer: &DesignResult) -> Report {
@@ -91,8 +91,26 @@ fn sentences(answer: &DesignResult) -> Vec<String> {
             c.rms,
             100.0 * c.coverage
         ));
+        out.push(format!("{} is identified in {}.", answer.parameter, named(c)));
+        out.push(match &answer.for_most {
+            Some(most) => format!(
+                "For 95 % of the drives: {:.1} minutes, which identify it in {}.",
+                most.length_s / 60.0,
+                named(most)
+            ),
+            None => "No length tried up to half an hour identifies it in 95 % of the drives.".into(),
+        });
     }
     out
+}
+
+/// How many fits call the parameter identified.
+fn named(c: &Confirmation) -> String {
+    let [low, high] = c.identified_share.map(|share| 100.0 * share);
+    format!(
+        "{} of {} of them ({low:.0} to {high:.0} %, 95 %)",
+        c.identified, c.fits
+    )
 }
 
 /// How little a drive that is long enough for another parameter tells of the delay; none if it tells enough.

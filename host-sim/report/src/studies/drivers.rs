@@ -31,7 +31,7 @@ fn number(value: impl Into<Option<f64>>) -> Cell {
 fn tables(found: &Drivers) -> Vec<Table> {
     let mut out = vec![each(found)];
     if !found.differences.is_empty() {
-        out.push(differences(&found.differences));
+        out.push(differences(found));
     }
     if !found.population.is_empty() {
         out.push(population(&found.population, &gaps(found)));
@@ -75,7 +75,13 @@ fn each(found: &Drivers) -> Table {
     Table::of_rows("Each driver; a dash: not identified.", rows)
 }
 
-fn differences(found: &[Difference]) -> Table {
+fn differences(found: &Drivers) -> Table {
+    let who = match &found.compared[..] {
+        [first, second] if found.drivers.len() > 2 => {
+            format!("{first} less {second}: the only two that are compared.")
+        }
+        _ => "The first driver less the second.".into(),
+    };
     let row = |d: &Difference| {
         let [low, high] = Cell::ends(d.interval_95, 4);
         let verdict = if d.real { "they differ" } else { "not told apart" };
@@ -92,11 +98,11 @@ fn differences(found: &[Difference]) -> Table {
     };
     Table::of_rows(
         format!(
-            "The first driver less the second. Each interval is that of its parameter alone; the verdict is on all {} together, at \
+            "{who} Each interval is that of its parameter alone; the verdict is on all {} together, at \
              5 % (Holm's method).",
-            found.len()
+            found.differences.len()
         ),
-        found.iter().map(row),
+        found.differences.iter().map(row),
     )
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use haptic_batch::Away;
 use haptic_batch::study::{
-    Difference, Recorded, Session, SessionResult, Source, StudyResults, Subject, of_participants,
+    Difference, Recorded, Repeated, Session, SessionResult, Source, StudyResults, Subject, of_participants,
 };
 use haptic_log::table::TableWriter;
 use haptic_metrics::{DEFINITIONS, Definition};
@@ -22,7 +22,10 @@ pub fn report(results: &StudyResults) -> Report {
             session.name()
         )));
     }
-    let differences = vec![Block::Table(differences(results))];
+    let mut differences = vec![Block::Table(differences(results))];
+    if !results.repeated.is_empty() {
+        differences.push(Block::Table(repeated(results)));
+    }
     let sections = vec![
         Section::new("Sessions", each),
         Section::new("By condition", vec![Block::Table(by_condition(results))]),
@@ -181,6 +184,33 @@ fn differences(results: &StudyResults) -> Table {
             results.level
         ),
         shown.map(row),
+    )
+}
+
+/// Whether the conditions differ at all, metric by metric.
+fn repeated(results: &StudyResults) -> Table {
+    let row = |r: &Repeated| {
+        let label = DEFINITIONS.iter().find(|own| own.name == r.metric);
+        let [of_conditions, of_participants] = r.test.freedom;
+        [
+            ("Metric", Cell::text(label.map_or(r.metric, |own| own.label))),
+            ("F", Cell::number(r.test.f, 2)),
+            ("df", Cell::number(of_conditions, 2)),
+            ("df of the rest", Cell::number(of_participants, 2)),
+            ("epsilon", Cell::number(r.test.epsilon, 3)),
+            ("p", Cell::number(r.test.p, 4)),
+            ("p (Holm)", Cell::number(r.p_holm, 4)),
+            ("n", Cell::count(r.participants)),
+        ]
+    };
+    Table::of_rows(
+        format!(
+            "All {} conditions together: analysis of variance within participants, its degrees of freedom times Greenhouse and \
+             Geisser's epsilon; p (Holm) is corrected for the {} metrics.",
+            results.conditions.len(),
+            results.repeated.len()
+        ),
+        results.repeated.iter().map(row),
     )
 }
 

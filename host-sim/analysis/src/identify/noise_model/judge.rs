@@ -30,6 +30,8 @@ const PROFILE_95: f64 = 3.841;
 const MATTERS: f64 = 0.3;
 /// Standard errors by which the record has to draw K_nms or t_nms from what is assumed before it is freed.
 const DRAWN: f64 = 3.0;
+/// Standard errors from 0 below which a gain_2 may be hidden by a line.
+const HIDDEN: f64 = 2.0;
 /// Twice the log likelihood ratio that the driver model has to gain over no driver at all.
 const LEAST_GAIN: f64 = 60.0;
 /// Guidance beyond this, N.m, is no offset of a sensor.
@@ -117,7 +119,8 @@ impl Problem<'_> {
             .as_ref()
             .and_then(|c| self.changed_sensor(c, options.manual));
         if sensor.is_none() {
-            refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
+            let balance = found.balance.iter();
+            refuted.extend(balance.flat_map(|b| verdict::of_balance(b, options.assisted)));
         }
         let signs_are_told = refuted.iter().any(|r| r.assumption == verdict::SIGNS);
         // A swapped sign of the lane makes a driver who steers away from it.
@@ -125,15 +128,7 @@ impl Problem<'_> {
         refuted.extend(of_motion(self.log, &self.stretches, may_be_swapped));
         // Where a sensor is wrong, all that follows from it looks like another driver too.
         let change = change.filter(|_| refuted.is_empty());
-        let mut others = verdict::of_residuals(
-            found.fit_percent,
-            &found.whiteness,
-            &found.input_correlation,
-            diagnostics::unexplained_autocorrelation(&found.traces.residual_nm, &self.log.resampling),
-        );
-        others.extend(self.beside_nothing(optimum).map(|r| (f64::INFINITY, r)));
-        others.extend(self.of_bounds(doubts));
-        others.extend(self.of_muscle(found, &optimum.point, doubts.alternatives, doubts.errors));
+        let mut others = self.other_evidence(found, optimum, doubts);
         // What the change explains better is no cause of its own, and a change is none where something else explains more: a fit
         // with the cure of the first is judged again.
         let change = change.filter(|c| sensor.is_some() || others.iter().all(|o| o.0 <= c.deviance));
@@ -156,6 +151,9 @@ impl Problem<'_> {
         let p = &optimum.point;
         found.assumed = verdict::ASSUMED.iter().map(|&a| a.to_owned()).collect();
         found.assumed.extend(self.withhold(&mut found.parameters));
+        found
+            .notes
+            .extend(self.hidden_gain_2(&mut found.parameters.gain_2));
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
             Some(inertia) => format!(
@@ -163,8 +161,45 @@ impl Problem<'_> {
             ),
             None => "driver_torque_nm is the torque of the hands: no wheel turns between them and the sensor".to_owned(),
         });
+        if options.assisted {
+            found.assumed.push(
+                "driver_torque_nm is recorded at no less than its value: beside a power assist the torques on the column do not tell"
+                    .to_owned(),
+            );
+        }
         found.assumed.extend(power_of(found));
         found.notes.extend(found.balance.as_ref().and_then(friction));
+    }
+
+    /// What is held against the model beside sensors and changes, each with what it adds to twice the log likelihood.
+    fn other_evidence(
+        &self,
+        found: &mut Identification,
+        optimum: &Optimum,
+        doubts: &Doubts<'_>,
+    ) -> Vec<(f64, Refutation)> {
+        let mut others = verdict::of_residuals(
+            found.fit_percent,
+            &found.whiteness,
+            &found.input_correlation,
+            [
+                diagnostics::unexplained_autocorrelation(&found.traces.residual_nm, &self.log.resampling),
+                self.bridged_share(found),
+            ],
+        );
+        others.extend(self.beside_nothing(optimum).map(|r| (f64::INFINITY, r)));
+        others.extend(self.of_bounds(doubts));
+        others.extend(verdict::of_gain_3(&found.parameters.gain_3));
+        others.extend(self.of_muscle(found, &optimum.point, doubts.alternatives, doubts.errors));
+        others
+    }
+
+    /// Share of the rows whose torque was missing or wrong, and is made of the neighbours'.
+    fn bridged_share(&self, found: &Identification) -> f64 {
+        let columns = found.preflight.iter().flat_map(|p| &p.columns);
+        let torque = columns.filter(|(name, _)| *name == "driver_torque_nm");
+        let bridged: usize = torque.map(|(_, f)| f.missing + f.spikes).sum();
+        bridged as f64 / self.log.len().max(1) as f64
     }
 
     /// By how much the vehicle is farther to the left after a change than before it, m.
@@ -258,6 +293,20 @@ impl Problem<'_> {
         out
     }
 
+    /// A line of the driver's own that is not estimated hides gain_2: one that is told from 0 by less than this many standard errors is not
+    /// called identified.
+    fn hidden_gain_2(&self, gain_2: &mut Parameter) -> Option<String> {
+        let is_target_line = self.assumed.iter().any(|a| a.place == OWN_OFFSET);
+        let (gain, error) = gain_2.estimate.zip(gain_2.standard_error)?;
+        (is_target_line && !gain_2.fixed && gain_2.identified && gain < HIDDEN * error).then(|| {
+            gain_2.estimate = None;
+            gain_2.identified = false;
+            "gain_2 is not told from 0, as where a driver keeps another line than the target line: a longer drive, or --fix line_offset \
+             tells more"
+                .to_owned()
+        })
+    }
+
     /// Calls nothing identified that this kind of record does not tell, and says why.
     fn withhold(&self, parameters: &mut Parameters) -> Option<String> {
         let k_hg = parameters.k_hg;
@@ -295,7 +344,10 @@ impl Problem<'_> {
     pub(super) fn drawn(&self, optimum: &Optimum) -> Option<usize> {
         let p = &optimum.point;
         let free: Vec<usize> = (0..self.size())
-            .filter(|&i| self.is_free(i) && (i >= super::COUNT || !self.bounds[i].touches(p[i])))
+            .filter(|&i| {
+                // What holds K_hg at 1 may be another arm than the one assumed.
+                self.is_free(i) && (i >= super::COUNT || i == K_HG || !self.bounds[i].touches(p[i]))
+            })
             .collect();
         let variance = self.error_variance(optimum);
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
@@ -430,6 +482,9 @@ fn power_of(found: &Identification) -> Vec<String> {
         None => Some("too short, or at more than one speed"),
         Some(b) if b.explained < verdict::BALANCE_SEEN => {
             Some("the column does not answer as one with a wheel alone, or hardly slides")
+        }
+        Some(b) if b.explained < verdict::BALANCE_CLOSE => {
+            Some("beyond their signs: gusts or the road turn the wheel too")
         }
         Some(_) => None,
     };

@@ -28,8 +28,9 @@ pub(super) struct Examined {
     pub faults: ColumnFaults,
 }
 
-/// Half the window of the running median, samples.
+/// Half the window of the running median, samples at most, and s: over a longer one the peaks of a probe of 2.5 Hz would be spikes.
 const HALF_WINDOW: usize = 3;
+const HALF_WINDOW_S: f64 = 0.034;
 /// A spike is so many robust standard deviations of what the running median leaves over.
 const SPIKE: f64 = 10.0;
 /// Share of the rows that bring no news in a signal that moves in steps or is held.
@@ -37,9 +38,9 @@ const STEPPED: f64 = 0.5;
 /// Stuck for so many rows, in a signal that otherwise never repeats itself.
 const STUCK_ROWS: usize = 3;
 
-/// Examines `signal`; changes below `least` never make a spike or a stuck run. Only what goes through the smoother of the
+/// Examines `signal`, whose rows are `dt_s` apart; changes below `least` never make a spike or a stuck run. Only what goes through the smoother of the
 /// `lane` loses the rows that bring no news.
-pub(super) fn examine(signal: &[f64], least: f64, lane: bool) -> Examined {
+pub(super) fn examine(signal: &[f64], dt_s: f64, least: f64, lane: bool) -> Examined {
     let n = signal.len();
     let mut out = Examined {
         signal: signal.to_vec(),
@@ -49,7 +50,8 @@ pub(super) fn examine(signal: &[f64], least: f64, lane: bool) -> Examined {
     };
     out.faults.missing = out.bad.iter().filter(|&&b| b).count();
     bridge(&mut out.signal, &out.bad);
-    out.mark_spikes(least);
+    let half = ((HALF_WINDOW_S / dt_s).round() as usize).clamp(1, HALF_WINDOW);
+    out.mark_spikes(least, half);
     out.mark_runs(least, lane);
     bridge(&mut out.signal, &out.bad);
     for (w, &bad) in out.weight.iter_mut().zip(&out.bad) {
@@ -117,17 +119,18 @@ fn runs(signal: &[f64]) -> Vec<std::ops::Range<usize>> {
 }
 
 impl Examined {
-    fn mark_spikes(&mut self, least: f64) {
+    fn mark_spikes(&mut self, least: f64, half: usize) {
         let u = &self.signal;
         let n = u.len();
-        if n < 2 * HALF_WINDOW + 2 {
+        if n < 2 * half + 2 {
             return;
         }
         let off = |k: usize| {
-            let from = k.saturating_sub(HALF_WINDOW).min(n - 2 * HALF_WINDOW - 1);
+            let from = k.saturating_sub(half).min(n - 2 * half - 1);
             let mut window = [0.0; 2 * HALF_WINDOW + 1];
-            window.copy_from_slice(&u[from..=from + 2 * HALF_WINDOW]);
-            (u[k] - median(&mut window)).abs()
+            let window = &mut window[..=2 * half];
+            window.copy_from_slice(&u[from..=from + 2 * half]);
+            (u[k] - median(window)).abs()
         };
         // Where the signal hardly bends, its own neighbours say enough: the median is taken of those that may be one.
         let suspects: Vec<(usize, f64)> = (0..n)
@@ -233,6 +236,24 @@ impl Examined {
                     self.weight[j] = 1.0;
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A probe of 0.2 N.m at 2.5 Hz with one row off by 0.3 N.m, at 120 and at 30 rows a second: that row is out of line, and no other.
+    #[test]
+    fn the_peaks_of_a_probe_are_no_spikes() {
+        for rate_hz in [120.0, 60.0, 30.0] {
+            let sine = |k: usize| 0.2 * (std::f64::consts::TAU * 2.5 * k as f64 / rate_hz).sin();
+            let mut torque: Vec<f64> = (0..1200).map(sine).collect();
+            torque[601] += 0.3;
+            let found = examine(&torque, 1.0 / rate_hz, 0.06, false);
+            assert_eq!(found.faults.spikes, 1, "{rate_hz} Hz");
+            assert!(found.bad[601]);
         }
     }
 }

@@ -122,7 +122,7 @@ pub(crate) struct Prepared {
 pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     let dt = log.dt_s;
     let columns = log.signals();
-    let examined = [0, 1, 2, 3, 4].map(|c| faults::examine(columns[c], LEAST[c], c < 2));
+    let examined = [0, 1, 2, 3, 4].map(|c| faults::examine(columns[c], dt, LEAST[c], c < 2));
     let lane = [0, 1].map(|c| {
         options
             .lane_noise

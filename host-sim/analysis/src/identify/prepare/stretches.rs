@@ -48,10 +48,13 @@ pub struct LeftOut {
     pub reason: Reason,
 }
 
-/// A torque that stays within a band of this width, N.m, for [`HANDS_OFF_S`], and that near zero, is of nobody's hands, ...
+/// A torque that stays within a band of this width, N.m, for [`HANDS_OFF_S`], and that near zero or, for a sensor may have an offset, near
+/// the middle of the drive's torques, is of nobody's hands, ...
 const HANDS_OFF_NM: f64 = 0.032;
 const HANDS_OFF_OFFSET_NM: f64 = 0.1;
 const HANDS_OFF_S: f64 = 2.0;
+/// Half the stretch that a sensor's noise is averaged over before that, s: hands move more slowly.
+const HANDS_NOISE_S: f64 = 0.05;
 /// ... if the far point and the guidance would have asked this of any driver meanwhile, N.m.
 const ASKED_NM: f64 = 0.05;
 /// A driver whose torque usually moves by so many of those bands in [`HANDS_OFF_S`] is never quiet for twice as long.
@@ -204,6 +207,15 @@ fn standstill(log: &DriveLog, noise: [LaneNoise; 2], rows: usize) -> Vec<Range<u
         .collect()
 }
 
+/// The mean of so many rows to both sides.
+fn averaged(signal: &[f64], half: usize) -> Vec<f64> {
+    let mean = |k: usize| {
+        let near = &signal[k.saturating_sub(half)..(k + half + 1).min(signal.len())];
+        near.iter().sum::<f64>() / near.len() as f64
+    };
+    (0..signal.len()).map(mean).collect()
+}
+
 /// Hands are off where the torque is quiet near zero although there was something to steer, or for long in a drive whose
 /// driver is not that quiet.
 fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
@@ -216,13 +228,19 @@ fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
     let restless = usual
         .get(usual.len() / 2)
         .is_some_and(|&u| u > RESTLESS * HANDS_OFF_NM);
-    let mut still = quiet(&log.driver_torque_nm, HANDS_OFF_NM, rows);
+    let half = (HANDS_NOISE_S / log.dt_s) as usize;
+    let mut still = quiet(&averaged(&log.driver_torque_nm, half), HANDS_OFF_NM, rows);
+    let mut torques = log.driver_torque_nm.clone();
+    let middle = torques.len() / 2;
+    let offset = *torques.select_nth_unstable_by(middle, f64::total_cmp).1;
     for (still, torque) in still.iter_mut().zip(&log.driver_torque_nm) {
-        *still &= torque.abs() <= HANDS_OFF_OFFSET_NM;
+        *still &= torque.abs().min((torque - offset).abs()) <= HANDS_OFF_OFFSET_NM;
     }
     true_runs(&still)
         .into_iter()
         .filter(|r| r.len() >= rows)
+        // At their ends the mean is half of hands.
+        .map(|r| r.start.saturating_sub(half)..(r.end + half).min(log.len()))
         .filter(|r| {
             let asked: f64 = r
                 .clone()
