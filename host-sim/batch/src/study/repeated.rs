@@ -6,7 +6,7 @@
 //! (1979), so that among conditions that are equal one study in twenty has any metric below 5 %.
 
 use haptic_analysis::identify::holm;
-use haptic_analysis::metrics::DEFINITIONS;
+use haptic_metrics::DEFINITIONS;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -47,7 +47,7 @@ pub(super) fn repeated(conditions: &[String], sessions: &[SessionResult]) -> Vec
     if conditions.len() < 3 {
         return Vec::new();
     }
-    let of_metric = |metric: &'static haptic_analysis::metrics::Definition| {
+    let of_metric = |metric: &'static haptic_metrics::Definition| {
         let columns = conditions
             .iter()
             .map(|name| of_participants(sessions, name, metric));
