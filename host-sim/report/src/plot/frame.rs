@@ -21,16 +21,12 @@ const GAP: f64 = 8.0;
 const TITLE_ROOM: f64 = 34.0;
 const TICK_TEXT_SIZE: u32 = 12;
 
-/// Most points of one line: two for each point of the page's width.
-const MOST_POINTS: usize = 1800;
 /// How far a drawn line may be from the data, points.
 const TOLERANCE: f64 = 0.15;
 /// Beyond five page widths a line is a scribble. Its dashes could not be read, and a wide line would be a blot: it is
 /// drawn solid and thin.
 const SCRIBBLE: f64 = 5.0 * PAGE_WIDTH;
 const SCRIBBLE_WIDTH: f64 = 1.0;
-/// Most points of an area's edge.
-const MOST_AREA_POINTS: usize = 600;
 /// A whole axis no longer than this has a tick at every number.
 const MOST_WHOLE_TICKS: f64 = 20.0;
 const STEM_WIDTH: f64 = 1.2;
@@ -192,10 +188,9 @@ impl<'a> Frame<'a> {
             Mark::Stems => stems(style, &from_zero()),
             Mark::Bounds => bounds(style, &from_zero(), BOUND),
             Mark::Ends => vec![ends(style).with_data(places).into()],
-            Mark::Interval(upper) => polyline::pieces(&series.points, upper)
+            Mark::Interval(upper) => polyline::pieces_of_area(&series.points, upper)
                 .into_iter()
                 .map(|piece| {
-                    let piece = polyline::thin_area(piece, MOST_AREA_POINTS);
                     let column = |i: usize| piece.iter().map(move |p| p[i]);
                     let band = BandPlot::new(column(0), column(1), column(2)).with_color(style.colour);
                     Plot::Band(band.with_opacity(INTERVAL_OPACITY))
@@ -262,8 +257,7 @@ impl<'a> Frame<'a> {
     pub(super) fn line_style(&self, series: &Series) -> (&'static str, f64) {
         let style = style::by_index(series.style);
         // All pieces of a series look alike.
-        let pieces = self.on_page(series);
-        let length: f64 = pieces.iter().map(|piece| polyline::length(piece)).sum();
+        let length: f64 = self.on_page(series).map(|piece| polyline::length(&piece)).sum();
         if length > SCRIBBLE && !self.lies() {
             ("", SCRIBBLE_WIDTH)
         } else {
@@ -280,16 +274,12 @@ impl<'a> Frame<'a> {
         )
     }
 
-    /// What of a line is drawn, in points of the page.
-    fn on_page(&self, series: &Series) -> Vec<Vec<(f64, f64)>> {
+    /// The pieces of a line, in points of the page.
+    fn on_page(&self, series: &Series) -> impl Iterator<Item = Vec<(f64, f64)>> {
         let (x_scale, y_scale) = self.scales();
-        let drawn = |piece| {
-            let thinned = polyline::thin(piece, MOST_POINTS).into_iter();
-            let scaled: Vec<_> = thinned.map(|(x, y)| (x * x_scale, y * y_scale)).collect();
-            polyline::simplify(&scaled, TOLERANCE)
-        };
-        let pieces = polyline::in_view(&series.points, self.x_limits).into_iter();
-        pieces.map(drawn).collect()
+        let scaled =
+            move |piece: &[(f64, f64)]| piece.iter().map(|(x, y)| (x * x_scale, y * y_scale)).collect();
+        polyline::pieces(&series.points).map(scaled)
     }
 
     fn lines(&self, series: &Series) -> Vec<Plot> {
@@ -300,10 +290,11 @@ impl<'a> Frame<'a> {
         }
         let (x_scale, y_scale) = self.scales();
         let on_axes = |piece: Vec<(f64, f64)>| {
-            let data = piece.into_iter().map(|(x, y)| (x / x_scale, y / y_scale));
+            let drawn = polyline::simplify(&piece, TOLERANCE).into_iter();
+            let data = drawn.map(|(x, y)| (x / x_scale, y / y_scale));
             line(data.collect(), style, dash, width)
         };
-        self.on_page(series).into_iter().map(on_axes).collect()
+        self.on_page(series).map(on_axes).collect()
     }
 }
 

@@ -1,8 +1,8 @@
 //! Figures: panels over one shared axis, drawn as SVG; the PNG is that SVG, rasterised.
 //!
-//! A [`Figure`] is plain data: fill it and call [`Figure::to_svg`] or [`Figure::to_png`]. The SVG is the one
-//! drawing: the PNG is made from its text, so the two cannot differ. Limits are given or taken from the data that
-//! are in view. A series breaks where a value is not finite, and is thinned without losing a peak. Colours (Okabe
+//! A [`Figure`] is plain data: fill it and call [`Figure::to_svg`]. The SVG is the one
+//! drawing: a PNG is made from its text by `png` (a feature of that name), so the two cannot differ. Limits are given or taken from the data that
+//! are in view. A series breaks where a value is not finite, and is thinned without losing a peak (`thin`). Colours (Okabe
 //! and Ito 2008) are told apart by colour-blind readers, and dashes, widths and markers in grey print. The font of
 //! the PNG is built in, so that no machine needs one.
 //!
@@ -20,10 +20,11 @@ mod legend;
 mod page;
 mod pages;
 mod polyline;
+#[cfg(any(test, feature = "png"))]
 mod raster;
 mod style;
+mod thin;
 
-pub(crate) use polyline::thin;
 pub(crate) use style::{colour, dash, width};
 
 use serde::Serialize;
@@ -302,6 +303,15 @@ pub enum Shade {
     Alert,
 }
 
+/// An SVG as a PNG with twice as many pixels along each side as the SVG has points.
+///
+/// # Errors
+/// What is no SVG, or has no area.
+#[cfg(any(test, feature = "png"))]
+pub fn png(svg: &str) -> Result<Vec<u8>, PlotError> {
+    raster::png(svg).map_err(|e| PlotError(e.to_string()))
+}
+
 /// Why a figure could not be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -330,15 +340,7 @@ impl Figure {
     /// A given limit is not finite, or does not lie below its upper one.
     pub fn to_svg(&self) -> Result<String, PlotError> {
         self.check_limits()?;
-        Ok(draw::svg(self))
-    }
-
-    /// The figure as a PNG, twice as many pixels wide as the SVG has points.
-    ///
-    /// # Errors
-    /// As [`Figure::to_svg`].
-    pub fn to_png(&self) -> Result<Vec<u8>, PlotError> {
-        raster::png(&self.to_svg()?).map_err(|e| PlotError(format!("figure '{}': {e}", self.title)))
+        Ok(draw::svg(&self.clone().thinned()))
     }
 
     /// Ends of the shared axis: as given, else of the data; (0, 1) if there is none.
