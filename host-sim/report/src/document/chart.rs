@@ -9,7 +9,7 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::plot::{Figure, Mark, Series, colour, dash, width};
+use crate::plot::{Figure, Mark, Series, colour, dash, units, width};
 
 pub(super) const SCRIPT: &str = concat!(
     include_str!("../../assets/uplot/uPlot.iife.min.js"),
@@ -43,13 +43,13 @@ pub(super) fn data(figure: &Figure) -> Option<String> {
             let series = panel.series.iter().map(series);
             json!({
                 "title": panel.title,
-                "label": panel.y.label,
+                "label": units(&panel.y.label),
                 "limits": fixed.then_some(limits),
                 "series": series.collect::<Vec<_>>(),
             })
         });
     let data = json!({
-        "x": figure.x.label,
+        "x": units(&figure.x.label),
         "whole": figure.x.whole,
         "limits": x_limits,
         "panels": panels.collect::<Vec<_>>(),

@@ -13,10 +13,13 @@ use super::{Figure, Mark, Marker, Panel, Series, polyline, style};
 
 /// Height of a row of names.
 const ROW_HEIGHT: f64 = 15.0;
+/// Height of a row from which lines lead to the next.
+const JOINED_ROW_HEIGHT: f64 = 44.0;
 /// Height of a row of fields.
 const FIELD_HEIGHT: f64 = 24.0;
-/// Below a panel with and without tick labels and axis label, and above one with and without title.
+/// Below a panel with tick labels and axis label, with the first alone, and with neither; above one with and without title.
 const AXIS_ROOM: f64 = 52.0;
+const TICK_ROOM: f64 = 28.0;
 const GAP: f64 = 8.0;
 const TITLE_ROOM: f64 = 34.0;
 const TICK_TEXT_SIZE: u32 = 12;
@@ -51,7 +54,7 @@ impl<'a> Frame<'a> {
         let plot = match figure.panels[index].fields() {
             Some([_, height]) => FIELD_HEIGHT * ((y_limits.1 - y_limits.0) / height).round(),
             None if figure.rows.is_empty() => PANEL_HEIGHT,
-            None => ROW_HEIGHT * figure.rows.len() as f64,
+            None => row_height(figure) * figure.rows.len() as f64,
         };
         let mut frame = Frame {
             figure,
@@ -84,7 +87,7 @@ impl<'a> Frame<'a> {
     }
 
     fn left(&self) -> f64 {
-        match (self.lies(), self.index) {
+        match (self.lies(), self.index % self.figure.columns()) {
             (true, 0) => names_room(self.figure),
             (true, _) => RIGHT,
             (false, _) => LEFT,
@@ -92,7 +95,12 @@ impl<'a> Frame<'a> {
     }
 
     fn below(&self) -> f64 {
-        if self.has_x_axis() { AXIS_ROOM } else { GAP }
+        let is_last = self.index / self.figure.columns() + 1 == self.figure.lines();
+        match self.has_x_axis() {
+            false => GAP,
+            true if self.figure.shared_label().is_some() && !is_last => TICK_ROOM,
+            true => AXIS_ROOM,
+        }
     }
 
     pub(super) fn layout(&self, panel: &Panel) -> Layout {
@@ -113,8 +121,11 @@ impl<'a> Frame<'a> {
         }
         if self.lies() {
             let names = self.figure.rows.iter().rev().cloned().collect();
-            layout = layout.with_x_label(&panel.y.label).with_y_categories(names);
-            layout.suppress_y_ticks = self.index > 0;
+            layout = layout.with_y_categories(names);
+            if self.figure.shared_label().is_none() {
+                layout = layout.with_x_label(&panel.y.label);
+            }
+            layout.suppress_y_ticks = self.index % self.figure.columns() > 0;
             return layout;
         }
         layout = layout.with_y_label(&panel.y.label);
@@ -295,6 +306,14 @@ impl<'a> Frame<'a> {
             line(data.collect(), style, dash, width)
         };
         self.on_page(series).map(on_axes).collect()
+    }
+}
+
+fn row_height(figure: &Figure) -> f64 {
+    let mut series = figure.panels.iter().flat_map(|panel| &panel.series);
+    match series.any(|series| series.joined) {
+        true => JOINED_ROW_HEIGHT,
+        false => ROW_HEIGHT,
     }
 }
 
