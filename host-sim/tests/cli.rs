@@ -220,6 +220,42 @@ fn a_png_comes_on_demand_and_from_a_build_that_has_it() {
     }
 }
 
+/// The vehicle of a file and the speed of an option are those of the drives.
+#[test]
+fn an_evaluation_takes_another_vehicle_and_another_scenario() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("car.toml", "speed_m_per_s = 20\n[vehicle]\nm_kg = 1300\n");
+    write(
+        "drive.toml",
+        "speed_m_per_s = 15\nseed = 5\n[driver]\nremnant_sd_nm = 0.02\n",
+    );
+    let evaluated = |options: &[&str]| {
+        let output = host_sim(
+            directory.path(),
+            &[&["evaluate", "--json", "--force"], options].concat(),
+        );
+        assert!(output.status.code() != Some(2), "{}", stderr(&output));
+        let results = json(&output);
+        let speed_kmh = results["speed_kmh"].as_f64().unwrap();
+        (
+            speed_kmh,
+            results["provenance"]["scenario"].as_str().unwrap().to_owned(),
+        )
+    };
+    let (speed_kmh, scenario) = evaluated(&["--scenario", "drive.toml", "--vehicle", "car.toml"]);
+    assert!((speed_kmh - 54.0).abs() < 1e-9, "{speed_kmh}");
+    for line in ["m_kg = 1300", "seed = 5", "remnant_sd_nm = 0.02"] {
+        assert!(
+            scenario.lines().any(|own| own.starts_with(line)),
+            "{line} in {scenario}"
+        );
+    }
+    let (speed_kmh, scenario) = evaluated(&["--vehicle", "car.toml", "--speed", "61"]);
+    assert!((speed_kmh - 61.0).abs() < 1e-9 && scenario.contains("m_kg = 1300"));
+    assert!(!scenario.contains("remnant_sd_nm = 0.02"));
+}
+
 /// What a result says of itself is enough to have it again, elsewhere and without the files that it was made from.
 #[test]
 fn a_result_is_repeated_from_itself() {
