@@ -98,14 +98,23 @@ fn add_interfaces(site: &Path) -> Result<()> {
     fs::copy(web::pack(Built::ToShip)?, site.join(LAB))?;
     let made = root().join("target/site-rust");
     let mut doc = cargo();
-    doc.args(["doc", "--release", "--no-deps", "--target-dir"]).arg(&made);
+    doc.args(["doc", "--release", "--no-deps", "--target-dir"])
+        .arg(&made);
     for name in CRATES {
         doc.args(["-p", name]);
     }
     run(&mut doc)?;
     fs::rename(made.join("doc"), site.join(RUST))?;
     run(python::with_package(Built::ForTests)?
-        .args(["-m", "pdoc", "--docformat", "numpy", "haptic_guidance", "haptic_guidance.envs", "-o"])
+        .args([
+            "-m",
+            "pdoc",
+            "--docformat",
+            "numpy",
+            "haptic_guidance",
+            "haptic_guidance.envs",
+            "-o",
+        ])
         .arg(site.join(PYTHON)))
 }
 
@@ -342,9 +351,8 @@ mod tests {
             }
         }
         let tables = ["laws", "drivers", "metrics"].map(|what| format!("{NAMED}{what}"));
-        let known = |command: &String| {
-            [FAULTS, REQUIREMENTS].contains(&command.as_str()) || tables.contains(command)
-        };
+        let known =
+            |command: &String| [FAULTS, REQUIREMENTS].contains(&command.as_str()) || tables.contains(command);
         assert!(!asked.is_empty() && asked.iter().all(known), "{asked:?}");
     }
 

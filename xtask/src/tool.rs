@@ -37,8 +37,8 @@ pub(crate) const SHAPE: [&str; 8] = [
     ALL_FORMATS,
 ];
 
-/// What the command line can read and write beyond what the first command builds.
-pub(crate) const ALL_FORMATS: &str = "host-sim/mcap";
+/// What the command line can read, write and draw beyond what the first command builds.
+pub(crate) const ALL_FORMATS: &str = "host-sim/full";
 
 /// The command line's file.
 pub(crate) const HOST_SIM: &str = if cfg!(windows) { "host-sim.exe" } else { "host-sim" };

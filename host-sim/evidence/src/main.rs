@@ -11,7 +11,7 @@ mod reports;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use host_sim::cli::{force, signed, status};
+use host_sim::cli::{FileArguments, signed, status};
 
 use cli::{availability, faults, handover, real_drives, reliance, validate};
 
@@ -21,9 +21,8 @@ use cli::{availability, faults, handover, real_drives, reliance, validate};
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Write also where files are that the command did not write
-    #[arg(long, global = true)]
-    force: bool,
+    #[command(flatten)]
+    files: FileArguments,
 }
 
 #[derive(Debug, Subcommand)]
@@ -68,15 +67,12 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => error.exit(),
     };
-    if cli.force {
-        force();
-    }
-    status(match &cli.command {
+    status(cli.files.choose().and_then(|()| match &cli.command {
         Command::Faults(arguments) => faults::run(arguments),
         Command::Availability(arguments) => availability::run(arguments),
         Command::Handover(arguments) => handover::run(arguments),
         Command::Reliance(arguments) => reliance::run(arguments),
         Command::Validate(arguments) => validate::run(arguments),
         Command::RealDrives(arguments) => real_drives::run(arguments),
-    })
+    }))
 }

@@ -1,7 +1,7 @@
 //! Results as tables, figures and documents for people.
 //!
 //! - [`document`]: a report in HTML, with its tables and figures; series as CSV; files that appear together or not at all.
-//! - [`plot`]: a figure as SVG and PNG.
+//! - [`plot`]: a figure as SVG, with the feature `png` as PNG too.
 //! - [`studies`]: what each study of `haptic-batch` leaves behind.
 //!
 //! ```

@@ -43,7 +43,7 @@ use haptic_log::near::did_you_mean;
 use serde::Serialize;
 
 pub use names::signed;
-pub use output::force;
+pub use output::FileArguments;
 
 /// Closed-loop workbench for the haptic-guidance steering controller
 #[derive(Debug, Parser)]
@@ -51,9 +51,8 @@ pub use output::force;
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Write also where files are that the command did not write
-    #[arg(long, global = true)]
-    force: bool,
+    #[command(flatten)]
+    files: FileArguments,
 }
 
 const AFTER_HELP: &str = "\
@@ -171,12 +170,7 @@ pub fn main() -> ExitCode {
         .try_get_matches_from(&arguments)
         .and_then(|matches| Cli::from_arg_matches(&matches));
     let result = match parsed {
-        Ok(cli) => {
-            if cli.force {
-                force();
-            }
-            run(&cli.command)
-        }
+        Ok(cli) => cli.files.choose().and_then(|()| run(&cli.command)),
         Err(error) => match names::explain(&error, &arguments) {
             Some(sentence) => Err(BadInput(sentence)),
             None => error.exit(),

@@ -7,13 +7,51 @@ use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
+use clap::Args;
 use haptic_report::document::{FileSet, Owner};
-use haptic_report::studies::OutputError;
+use haptic_report::studies::{OutputError, Pictures};
 
 use super::{BadInput, INTERRUPTED};
 
-/// Whether `--force` was given.
+/// How files are written, of whatever command.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct FileArguments {
+    /// Write also where files are that the command did not write
+    #[arg(long, global = true)]
+    force: bool,
+    /// Each figure also as PNG, where neither a report in HTML nor an SVG can be opened
+    #[arg(long, global = true)]
+    png: bool,
+}
+
 static FORCE: AtomicBool = AtomicBool::new(false);
+static PNG: AtomicBool = AtomicBool::new(false);
+
+impl FileArguments {
+    /// From now on files are written so.
+    ///
+    /// # Errors
+    /// This build draws no PNG.
+    pub fn choose(self) -> Result<(), BadInput> {
+        if self.png && !cfg!(feature = "png") {
+            let sentence = "--png: this build draws SVG alone, which takes half a minute from the first build: build host-sim with \
+                            `--features png`, as in cargo run --release -p host-sim --features png -- run SCENARIO.toml --out out --png";
+            return Err(sentence.into());
+        }
+        FORCE.store(self.force, Ordering::Relaxed);
+        PNG.store(self.png, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// Files of the figures, as `--png` chose them.
+pub(super) fn pictures() -> Pictures {
+    #[cfg(feature = "png")]
+    if PNG.load(Ordering::Relaxed) {
+        return Pictures::AlsoPixels;
+    }
+    Pictures::Drawings
+}
 
 /// What an interrupt has to remove. Locked while a set begins and while its files are moved into place, so that
 /// an interrupt waits.
@@ -81,12 +119,7 @@ fn owner<'a>(command: &'a str, keeps: &'a [&'a str]) -> Owner<'a> {
     }
 }
 
-/// From now on sets take the place of whatever is in their directory.
-pub fn force() {
-    FORCE.store(true, Ordering::Relaxed);
-}
-
-/// Whether they do.
+/// Whether sets take the place of whatever is in their directory.
 pub(super) fn is_forced() -> bool {
     FORCE.load(Ordering::Relaxed)
 }

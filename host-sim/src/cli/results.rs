@@ -7,7 +7,7 @@ use haptic_batch::Confidence;
 use haptic_report::document::{Report, write_json};
 use serde::Serialize;
 
-use super::output::Output;
+use super::output::{Output, pictures};
 use super::progress::Threads;
 use super::{BadInput, Outcome, print, print_json, print_notes, width};
 
@@ -112,7 +112,7 @@ impl Results<'_> {
     ) -> Result<Outcome, BadInput> {
         if let Some(output) = self.output {
             write_json(&output.place().join(self.file), results)?;
-            output.finish(|place| haptic_report::studies::write(report, place))?;
+            output.finish(|place| haptic_report::studies::write(report, place, pictures()))?;
         }
         if self.arguments.json {
             print_json(results)?;

@@ -12,7 +12,6 @@ use haptic_batch::sweep::{Shard, Store, StoreError, Sweep, run_all};
 use haptic_report::document::{SeriesFormat, write_bytes, write_json};
 use haptic_report::studies::run as run_files;
 use haptic_report::studies::sweep as files;
-use haptic_report::studies::write;
 use indicatif::ProgressBar;
 
 use super::output::{self, Output};
@@ -143,7 +142,7 @@ fn write_drive(scenario: &haptic_sim::Scenario, directory: &Path) -> Result<(), 
         write_bytes(&place.join("scenario.toml"), scenario.to_toml())?;
         run_files::write_series(&single, SeriesFormat::Csv, place)?;
         write_json(&place.join("results.json"), &report.stamp(&single.results))?;
-        write(&report, place)
+        haptic_report::studies::write(&report, place, output::pictures())
     })?;
     eprintln!("Report: {}", directory.join("report.html").display());
     Ok(())

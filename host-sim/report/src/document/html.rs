@@ -7,20 +7,20 @@
 
 use haptic_log::Event;
 
-use super::{Block, Cell, Provenance, Report, Section, Table, chart, signed};
+use super::{Block, Cell, Drawings, Provenance, Report, Section, Table, chart, signed};
 use crate::plot::{Figure, PlotError};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Figures keep white paper in the dark: their colours are chosen for it.
 const STYLE: &str = include_str!("report.css");
 
-pub(super) fn document(report: &Report) -> Result<String, PlotError> {
+pub(super) fn document(report: &Report, drawings: &Drawings) -> Result<String, PlotError> {
     let shown = |section: &&Section| section.blocks.iter().any(Block::is_on_page);
     let parts: Vec<&Section> = report.sections.iter().filter(shown).collect();
     let sections = parts
         .iter()
         .enumerate()
-        .map(|(i, s)| section(i, s))
+        .map(|(i, s)| section(i, s, drawings))
         .collect::<Result<Vec<_>, _>>()?;
     let policy = format!(
         "default-src 'none'; style-src 'unsafe-inline'; script-src '{}'",
@@ -56,12 +56,12 @@ pub(super) fn document(report: &Report) -> Result<String, PlotError> {
     Ok(page.into_string())
 }
 
-fn section(index: usize, section: &Section) -> Result<Markup, PlotError> {
+fn section(index: usize, section: &Section, drawings: &Drawings) -> Result<Markup, PlotError> {
     let blocks = section
         .blocks
         .iter()
         .enumerate()
-        .map(|(i, b)| block(&format!("{index}-{i}"), b))
+        .map(|(i, b)| block(&format!("{index}-{i}"), b, drawings))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
         section id={ "section-" (index + 1) } {
@@ -72,27 +72,36 @@ fn section(index: usize, section: &Section) -> Result<Markup, PlotError> {
 }
 
 /// `id` tells the block from the others of the page.
-fn block(id: &str, block: &Block) -> Result<Markup, PlotError> {
+fn block(id: &str, block: &Block, drawings: &Drawings) -> Result<Markup, PlotError> {
     Ok(match block {
         Block::Text(text) => html! { p { (text) } },
         Block::Table(t) => html! { @if !t.rows.is_empty() { (table(t)) } },
-        Block::Figure { figure, caption, .. } => self::figure(id, figure, caption)?,
+        Block::Figure {
+            name,
+            figure,
+            caption,
+        } => match drawings.get(name.as_str()) {
+            Some(drawn) => self::figure(id, figure, caption, drawn),
+            None => self::figure(id, figure, caption, &drawn(figure)?),
+        },
         Block::Events(list) => events(list),
-        Block::OnPage(block) => self::block(id, block)?,
+        Block::OnPage(block) => self::block(id, block, drawings)?,
         Block::OnTerminal(_) => html! {},
     })
 }
 
-fn figure(id: &str, figure: &Figure, caption: &str) -> Result<Markup, PlotError> {
+/// The SVGs of a figure, one for each page of paper that it takes.
+pub(super) fn drawn(figure: &Figure) -> Result<Vec<String>, PlotError> {
+    figure.pages().iter().map(Figure::to_svg).collect()
+}
+
+fn figure(id: &str, figure: &Figure, caption: &str, drawn: &[String]) -> Markup {
     // Names of clip paths have to differ from those of the page's other drawings.
-    let drawing = |(number, piece): (usize, Figure)| {
-        let named = format!("clip-{id}-{number}-");
-        Ok(piece.to_svg()?.replace("kuva-clip-", &named))
-    };
-    let drawings = figure.pages().into_iter().enumerate().map(drawing);
-    let drawings = drawings.collect::<Result<Vec<String>, PlotError>>()?;
+    let named = |number| format!("clip-{id}-{number}-");
+    let drawings = drawn.iter().enumerate();
+    let drawings = drawings.map(|(number, svg)| svg.replace("kuva-clip-", &named(number)));
     let data = chart::data(figure);
-    Ok(html! {
+    html! {
         figure {
             @for svg in drawings { (PreEscaped(svg)) }
             figcaption {
@@ -101,7 +110,7 @@ fn figure(id: &str, figure: &Figure, caption: &str) -> Result<Markup, PlotError>
             }
             @if let Some(data) = data { script type="application/json" { (PreEscaped(data)) } }
         }
-    })
+    }
 }
 
 fn footer(provenance: &Provenance) -> Markup {

@@ -22,6 +22,8 @@ pub use metric_tables::{definitions_table, metrics_table};
 pub use provenance::{Provenance, Stamped};
 pub use trace_csv::{SeriesFormat, write_trace};
 
+use std::collections::BTreeMap;
+
 use haptic_log::Event;
 
 use crate::plot::{Figure, PlotError};
@@ -69,7 +71,7 @@ pub enum Block {
     Table(Table),
     /// A drawing and what it shows.
     Figure {
-        /// Its files are `NAME.svg` and `NAME.png`.
+        /// Its files are `NAME.svg`, `NAME.txt` with the caption, and `NAME.png` if one is asked for.
         name: String,
         /// The drawing.
         figure: Figure,
@@ -85,11 +87,11 @@ pub enum Block {
 }
 
 impl Block {
-    /// A drawing, the name of its files, and what it shows.
+    /// A drawing with no more points than can be seen, the name of its files, and what it shows.
     pub fn figure(name: impl Into<String>, figure: Figure, caption: impl Into<String>) -> Self {
         Self::Figure {
             name: name.into(),
-            figure,
+            figure: figure.thinned(),
             caption: caption.into(),
         }
     }
@@ -216,6 +218,16 @@ pub fn signed(value: f64) -> String {
     }
 }
 
+/// A figure as it is drawn.
+pub(crate) struct Drawn<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) caption: &'a str,
+    pub(crate) svg: String,
+}
+
+/// The SVGs of figures by their names, one for each page of paper.
+type Drawings<'a> = BTreeMap<&'a str, Vec<String>>;
+
 impl Report {
     /// A report of these sections, without notes.
     pub fn new(title: impl Into<String>, summary: impl Into<String>, sections: Vec<Section>) -> Self {
@@ -232,7 +244,31 @@ impl Report {
     /// # Errors
     /// A figure cannot be drawn.
     pub fn to_html(&self) -> Result<String, PlotError> {
-        html::document(self)
+        html::document(self, &Drawings::new())
+    }
+
+    /// The SVG of each figure with its name and caption, and the page that shows them: each is drawn once.
+    pub(crate) fn drawn(&self) -> Result<(Vec<Drawn<'_>>, String), PlotError> {
+        let mut drawings = Drawings::new();
+        let mut all = Vec::new();
+        for block in self.sections.iter().flat_map(|section| &section.blocks) {
+            if let Block::Figure {
+                name,
+                figure,
+                caption,
+            } = block
+            {
+                let pages = html::drawn(figure)?;
+                let svg = match pages.as_slice() {
+                    [one] => one.clone(),
+                    _ => figure.to_svg()?,
+                };
+                drawings.insert(name, pages);
+                all.push(Drawn { name, caption, svg });
+            }
+        }
+        let page = html::document(self, &drawings)?;
+        Ok((all, page))
     }
 
     /// Results with where they come from.

@@ -4,21 +4,20 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::figure::Figure as Grid;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
+use kuva::render::render::TextAnchor;
 
-use super::Figure;
 use super::frame::Frame;
 use super::legend::Legend;
-use super::page::{LEFT, PAGE_WIDTH, PANEL_HEIGHT, TEXT_SIZE, names_room};
+use super::page::{LEFT, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, TEXT_SIZE, names_room, text};
+use super::{Figure, typeset};
 
 /// Around the page.
 const PADDING: f64 = 6.0;
+/// Height of the label below the panels.
+const LABEL_ROOM: f64 = 24.0;
 
 pub(super) fn svg(figure: &Figure) -> String {
-    let columns = if figure.rows.is_empty() {
-        1
-    } else {
-        figure.panels.len().max(1)
-    };
+    let columns = figure.columns();
     let frames: Vec<Frame> = (0..figure.panels.len())
         .zip(figure.y_limits())
         .map(|(i, y_limits)| Frame::new(figure, i, y_limits))
@@ -36,7 +35,7 @@ pub(super) fn svg(figure: &Figure) -> String {
         page.structure.push(vec![first + i]);
         page.cells.push(frame.plots(panel));
         page.layouts.push(frame.layout(panel));
-        if columns == 1 || i == 0 {
+        if i % columns == 0 {
             page.heights.push(frame.height);
         }
     }
@@ -66,13 +65,18 @@ pub(super) fn svg(figure: &Figure) -> String {
             .words(panel, [x, y], widths[i % columns])
             .into_iter()
             .for_each(|word| scene.add(word));
-        if columns > 1 {
-            x += widths[i];
-        } else {
-            y += frame.height;
+        x += widths[i % columns];
+        if (i + 1) % columns == 0 {
+            (x, y) = (PADDING, y + frame.height);
         }
     }
-    tidy(&SvgBackend::new().render_scene(&scene), scene.width, scene.height)
+    if let Some(label) = figure.shared_label() {
+        let middle = PADDING + 0.5 * (widths.iter().sum::<f64>() + names_room(figure) - RIGHT);
+        let y = scene.height - PADDING - 0.5 * LABEL_ROOM;
+        scene.add(text(middle, y, label, TEXT_SIZE, TextAnchor::Middle, "#000000"));
+    }
+    let svg = tidy(&SvgBackend::new().render_scene(&scene), scene.width, scene.height);
+    typeset::texts(&svg)
 }
 
 /// Round joins, because a mitred join of a zigzag reaches beyond the data. The names of clip paths, which the

@@ -13,24 +13,23 @@ use super::{Figure, Mark, Marker, Panel, Series, polyline, style};
 
 /// Height of a row of names.
 const ROW_HEIGHT: f64 = 15.0;
+/// Height of a row from which lines lead to the next.
+const JOINED_ROW_HEIGHT: f64 = 44.0;
 /// Height of a row of fields.
 const FIELD_HEIGHT: f64 = 24.0;
-/// Below a panel with and without tick labels and axis label, and above one with and without title.
+/// Below a panel with tick labels and axis label, with the first alone, and with neither; above one with and without title.
 const AXIS_ROOM: f64 = 52.0;
+const TICK_ROOM: f64 = 28.0;
 const GAP: f64 = 8.0;
 const TITLE_ROOM: f64 = 34.0;
 const TICK_TEXT_SIZE: u32 = 12;
 
-/// Most points of one line: two for each point of the page's width.
-const MOST_POINTS: usize = 1800;
 /// How far a drawn line may be from the data, points.
 const TOLERANCE: f64 = 0.15;
 /// Beyond five page widths a line is a scribble. Its dashes could not be read, and a wide line would be a blot: it is
 /// drawn solid and thin.
 const SCRIBBLE: f64 = 5.0 * PAGE_WIDTH;
 const SCRIBBLE_WIDTH: f64 = 1.0;
-/// Most points of an area's edge.
-const MOST_AREA_POINTS: usize = 600;
 /// A whole axis no longer than this has a tick at every number.
 const MOST_WHOLE_TICKS: f64 = 20.0;
 const STEM_WIDTH: f64 = 1.2;
@@ -55,7 +54,7 @@ impl<'a> Frame<'a> {
         let plot = match figure.panels[index].fields() {
             Some([_, height]) => FIELD_HEIGHT * ((y_limits.1 - y_limits.0) / height).round(),
             None if figure.rows.is_empty() => PANEL_HEIGHT,
-            None => ROW_HEIGHT * figure.rows.len() as f64,
+            None => row_height(figure) * figure.rows.len() as f64,
         };
         let mut frame = Frame {
             figure,
@@ -88,7 +87,7 @@ impl<'a> Frame<'a> {
     }
 
     fn left(&self) -> f64 {
-        match (self.lies(), self.index) {
+        match (self.lies(), self.index % self.figure.columns()) {
             (true, 0) => names_room(self.figure),
             (true, _) => RIGHT,
             (false, _) => LEFT,
@@ -96,7 +95,12 @@ impl<'a> Frame<'a> {
     }
 
     fn below(&self) -> f64 {
-        if self.has_x_axis() { AXIS_ROOM } else { GAP }
+        let is_last = self.index / self.figure.columns() + 1 == self.figure.lines();
+        match self.has_x_axis() {
+            false => GAP,
+            true if self.figure.shared_label().is_some() && !is_last => TICK_ROOM,
+            true => AXIS_ROOM,
+        }
     }
 
     pub(super) fn layout(&self, panel: &Panel) -> Layout {
@@ -117,8 +121,11 @@ impl<'a> Frame<'a> {
         }
         if self.lies() {
             let names = self.figure.rows.iter().rev().cloned().collect();
-            layout = layout.with_x_label(&panel.y.label).with_y_categories(names);
-            layout.suppress_y_ticks = self.index > 0;
+            layout = layout.with_y_categories(names);
+            if self.figure.shared_label().is_none() {
+                layout = layout.with_x_label(&panel.y.label);
+            }
+            layout.suppress_y_ticks = self.index % self.figure.columns() > 0;
             return layout;
         }
         layout = layout.with_y_label(&panel.y.label);
@@ -192,10 +199,9 @@ impl<'a> Frame<'a> {
             Mark::Stems => stems(style, &from_zero()),
             Mark::Bounds => bounds(style, &from_zero(), BOUND),
             Mark::Ends => vec![ends(style).with_data(places).into()],
-            Mark::Interval(upper) => polyline::pieces(&series.points, upper)
+            Mark::Interval(upper) => polyline::pieces_of_area(&series.points, upper)
                 .into_iter()
                 .map(|piece| {
-                    let piece = polyline::thin_area(piece, MOST_AREA_POINTS);
                     let column = |i: usize| piece.iter().map(move |p| p[i]);
                     let band = BandPlot::new(column(0), column(1), column(2)).with_color(style.colour);
                     Plot::Band(band.with_opacity(INTERVAL_OPACITY))
@@ -262,8 +268,7 @@ impl<'a> Frame<'a> {
     pub(super) fn line_style(&self, series: &Series) -> (&'static str, f64) {
         let style = style::by_index(series.style);
         // All pieces of a series look alike.
-        let pieces = self.on_page(series);
-        let length: f64 = pieces.iter().map(|piece| polyline::length(piece)).sum();
+        let length: f64 = self.on_page(series).map(|piece| polyline::length(&piece)).sum();
         if length > SCRIBBLE && !self.lies() {
             ("", SCRIBBLE_WIDTH)
         } else {
@@ -280,16 +285,12 @@ impl<'a> Frame<'a> {
         )
     }
 
-    /// What of a line is drawn, in points of the page.
-    fn on_page(&self, series: &Series) -> Vec<Vec<(f64, f64)>> {
+    /// The pieces of a line, in points of the page.
+    fn on_page(&self, series: &Series) -> impl Iterator<Item = Vec<(f64, f64)>> {
         let (x_scale, y_scale) = self.scales();
-        let drawn = |piece| {
-            let thinned = polyline::thin(piece, MOST_POINTS).into_iter();
-            let scaled: Vec<_> = thinned.map(|(x, y)| (x * x_scale, y * y_scale)).collect();
-            polyline::simplify(&scaled, TOLERANCE)
-        };
-        let pieces = polyline::in_view(&series.points, self.x_limits).into_iter();
-        pieces.map(drawn).collect()
+        let scaled =
+            move |piece: &[(f64, f64)]| piece.iter().map(|(x, y)| (x * x_scale, y * y_scale)).collect();
+        polyline::pieces(&series.points).map(scaled)
     }
 
     fn lines(&self, series: &Series) -> Vec<Plot> {
@@ -300,10 +301,19 @@ impl<'a> Frame<'a> {
         }
         let (x_scale, y_scale) = self.scales();
         let on_axes = |piece: Vec<(f64, f64)>| {
-            let data = piece.into_iter().map(|(x, y)| (x / x_scale, y / y_scale));
+            let drawn = polyline::simplify(&piece, TOLERANCE).into_iter();
+            let data = drawn.map(|(x, y)| (x / x_scale, y / y_scale));
             line(data.collect(), style, dash, width)
         };
-        self.on_page(series).into_iter().map(on_axes).collect()
+        self.on_page(series).map(on_axes).collect()
+    }
+}
+
+fn row_height(figure: &Figure) -> f64 {
+    let mut series = figure.panels.iter().flat_map(|panel| &panel.series);
+    match series.any(|series| series.joined) {
+        true => JOINED_ROW_HEIGHT,
+        false => ROW_HEIGHT,
     }
 }
 

@@ -1,14 +1,16 @@
 //! Figures: panels over one shared axis, drawn as SVG; the PNG is that SVG, rasterised.
 //!
-//! A [`Figure`] is plain data: fill it and call [`Figure::to_svg`] or [`Figure::to_png`]. The SVG is the one
-//! drawing: the PNG is made from its text, so the two cannot differ. Limits are given or taken from the data that
-//! are in view. A series breaks where a value is not finite, and is thinned without losing a peak. Colours (Okabe
+//! A [`Figure`] is plain data: fill it and call [`Figure::to_svg`]. The SVG is the one
+//! drawing: a PNG is made from its text by `png` (a feature of that name), so the two cannot differ. Limits are given or taken from the data that
+//! are in view. A series breaks where a value is not finite, and is thinned without losing a peak (`thin`). Colours (Okabe
 //! and Ito 2008) are told apart by colour-blind readers, and dashes, widths and markers in grey print. The font of
 //! the PNG is built in, so that no machine needs one.
 //!
+//! Symbols in its words, such as `K_hg`, get their subscripts when it is drawn.
+//!
 //! Terms: a *series* is a row of points with a [`Mark`] that says how they are drawn; a *band* is a shaded stretch
 //! of the shared axis; a *marker* is one place on it. A figure of *rows* has names in place of numbers on its
-//! shared axis, and lies on its side, so that long names can be read. What in it lies beyond given limits stands at the
+//! shared axis, and lies on its side, so that long names can be read; its panels stand side by side. What in it lies beyond given limits stands at the
 //! frame as a number with an arrow.
 //!
 //! The drawing itself is done by the crates `kuva` (SVG) and `resvg` (pixels). What to plot is decided by studies,
@@ -20,11 +22,14 @@ mod legend;
 mod page;
 mod pages;
 mod polyline;
+#[cfg(any(test, feature = "png"))]
 mod raster;
 mod style;
+mod thin;
+mod typeset;
 
-pub(crate) use polyline::thin;
 pub(crate) use style::{colour, dash, width};
+pub(crate) use typeset::units;
 
 use serde::Serialize;
 
@@ -39,7 +44,7 @@ pub struct Figure {
     pub rows: Vec<String>,
     /// Whether all panels have the same limits for their values.
     pub same_y: bool,
-    /// From top to bottom; from left to right in a figure of rows.
+    /// From top to bottom; from left to right, in lines, in a figure of rows.
     pub panels: Vec<Panel>,
     /// Lines through all panels.
     pub markers: Vec<Marker>,
@@ -302,6 +307,15 @@ pub enum Shade {
     Alert,
 }
 
+/// An SVG as a PNG with twice as many pixels along each side as the SVG has points.
+///
+/// # Errors
+/// What is no SVG, or has no area.
+#[cfg(any(test, feature = "png"))]
+pub fn png(svg: &str) -> Result<Vec<u8>, PlotError> {
+    raster::png(svg).map_err(|e| PlotError(e.to_string()))
+}
+
 /// Why a figure could not be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -309,6 +323,8 @@ pub struct PlotError(String);
 
 /// Room left between a series and the frame, as a share of the extent of the values.
 const MARGIN: f64 = 0.05;
+/// Panels of a figure of rows that a page has room for beside each other.
+const MOST_COLUMNS: usize = 3;
 /// Room left behind a line that ends before its time, as a share of the extent.
 const ROOM_BEHIND: f64 = 0.02;
 
@@ -330,15 +346,7 @@ impl Figure {
     /// A given limit is not finite, or does not lie below its upper one.
     pub fn to_svg(&self) -> Result<String, PlotError> {
         self.check_limits()?;
-        Ok(draw::svg(self))
-    }
-
-    /// The figure as a PNG, twice as many pixels wide as the SVG has points.
-    ///
-    /// # Errors
-    /// As [`Figure::to_svg`].
-    pub fn to_png(&self) -> Result<Vec<u8>, PlotError> {
-        raster::png(&self.to_svg()?).map_err(|e| PlotError(format!("figure '{}': {e}", self.title)))
+        Ok(draw::svg(&self.clone().thinned()))
     }
 
     /// Ends of the shared axis: as given, else of the data; (0, 1) if there is none.
@@ -359,6 +367,27 @@ impl Figure {
             None => (0.0, 1.0),
         };
         self.x.limits.unwrap_or_else(of_data)
+    }
+
+    /// Panels beside each other: of a figure of rows at most three, as evenly as they fill their lines.
+    fn columns(&self) -> usize {
+        let panels = self.panels.len().max(1);
+        match self.rows.is_empty() {
+            true => 1,
+            false => panels.div_ceil(panels.div_ceil(MOST_COLUMNS)),
+        }
+    }
+
+    /// Lines of panels.
+    fn lines(&self) -> usize {
+        self.panels.len().max(1).div_ceil(self.columns())
+    }
+
+    /// What the values of all panels of a figure of rows are, if they are one thing: it is written once, below all.
+    fn shared_label(&self) -> Option<&str> {
+        let label = &self.panels.first()?.y.label;
+        let shared = self.panels.len() > 1 && self.panels.iter().all(|panel| panel.y.label == *label);
+        (shared && !self.rows.is_empty()).then_some(label)
     }
 
     /// Whether any series has such a mark.
@@ -382,7 +411,8 @@ impl Figure {
         let visible = |panel: &Panel| extent(panel.series.iter().flat_map(|s| s.values_within(x)));
         let extents: Vec<_> = self.panels.iter().map(visible).collect();
         let of_all = extent(extents.iter().flatten().flat_map(|&(low, high)| [low, high]));
-        let stands = (self.has_lines() || !self.rows.is_empty()) && !self.has_ends();
+        let in_rows = !self.rows.is_empty() && self.has(|mark| matches!(mark, Mark::Stems | Mark::Bounds));
+        let stands = (self.has_lines() || in_rows) && !self.has_ends();
         let limits = |(panel, own): (&Panel, &Option<(f64, f64)>)| {
             let data = if self.same_y { of_all } else { *own };
             panel.y.limits.unwrap_or_else(|| with_room(data, stands))

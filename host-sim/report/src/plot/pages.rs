@@ -45,7 +45,8 @@ impl Figure {
                 vec![self.clone()]
             };
         }
-        let pages = self.rows.len().div_ceil(ROWS);
+        // Several lines of panels share a page.
+        let pages = self.rows.len().div_ceil((ROWS / self.lines()).max(1));
         let most = self.rows.len().div_ceil(pages);
         let piece = |(number, rows): (usize, &[String])| {
             let first = (number * most) as f64;

@@ -1,5 +1,8 @@
 //! Several drivers beside each other: what differs between two, and what a group is like.
 
+use std::collections::BTreeSet;
+use std::path::Path;
+
 use super::place;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Series};
@@ -12,7 +15,7 @@ const SHOWN: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
 /// The document of the drivers.
 pub fn report(found: &Drivers) -> Report {
     let caption = format!(
-        "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. Drives \
+        "Each driver with the 95 % interval of that driver's own drive; the dashed lines are the ends of the interval of the group's mean. Drives \
              too imprecise to name a value count with what they tell. {}",
         gaps(found)
     );
@@ -126,14 +129,31 @@ fn population(found: &[Population], gaps: &str) -> Table {
     )
 }
 
+/// The drives' names without their folders and endings, if these still tell them apart.
+fn names(found: &Drivers) -> Vec<String> {
+    let short = |(name, _): &(String, _)| {
+        let stem = Path::new(name).file_stem();
+        stem.map_or(name.clone(), |stem| stem.to_string_lossy().into_owned())
+    };
+    let short: Vec<String> = found.drivers.iter().map(short).collect();
+    if short.iter().collect::<BTreeSet<_>>().len() == short.len() {
+        return short;
+    }
+    found.drivers.iter().map(|(name, _)| name.clone()).collect()
+}
+
 fn figure(found: &Drivers) -> Figure {
-    let count = found.drivers.len();
-    let ends = [0.5, count as f64 + 0.5];
+    let names = names(found);
+    let ends = [0.5, names.len() as f64 + 0.5];
     let panels = SHOWN.iter().map(|&wanted| {
         let mut series = Vec::new();
         if let Some(p) = found.population.iter().find(|p| p.parameter == wanted) {
-            let interval = [p.mean_interval_95; 2];
-            series.push(Series::interval("mean of the group, 95 %", 5, &ends, &interval));
+            for (label, at) in ["mean of the group: its 95 % interval", ""]
+                .into_iter()
+                .zip(p.mean_interval_95)
+            {
+                series.push(Series::line(label, 2, ends.map(|row| (row, at)).to_vec()));
+            }
         }
         let (mut points, mut intervals, mut unit) =
             ([const { Vec::new() }; 2], [const { Vec::new() }; 2], "-");
@@ -157,6 +177,6 @@ fn figure(found: &Drivers) -> Figure {
         }
         Axis::new(wanted, unit).panel(series)
     });
-    let x = Axis::counting("Driver, as the table lists them").within(ends[0], ends[1]);
-    x.figure(panels)
+    let panels: Vec<_> = panels.collect();
+    Figure::of_rows(names, panels)
 }

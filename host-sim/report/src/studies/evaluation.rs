@@ -12,6 +12,7 @@ use haptic_batch::RunRecord;
 use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, EvaluationResults};
 use haptic_metrics::{DEFINITIONS, Definition};
 use haptic_sim::models::road::PAPER_COURSE;
+use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
 use haptic_sim::simulation::Run;
 use haptic_sim::unguided::stretches;
@@ -204,8 +205,9 @@ pub fn report(evaluation: &Evaluation) -> Report {
     };
     let all = DEFINITIONS.chunks(9).map(some);
     let all = all.chain([Block::Table(definitions_table()).on_page()]);
+    let vehicle = first.map_or_else(String::new, |(scenario, _)| vehicle(scenario));
     let summary = format!(
-        "Three drivers under four conditions on {}, {speed}, the shipping controller in the loop, sensors: {}. {course}Metrics \
+        "Three drivers under four conditions on {}, {speed}, {vehicle}the shipping controller in the loop, sensors: {}. {course}Metrics \
          are taken over {from} to {to} m of {:.0} m of road, failure at {failure_s} s.",
         results.course,
         format!("{:?}", results.sensors).to_lowercase(),
@@ -228,6 +230,15 @@ pub fn report(evaluation: &Evaluation) -> Report {
         provenance: provenance(evaluation),
         ..Report::new("Evaluation of shared steering control", summary, sections)
     }
+}
+
+/// The vehicle in a word, if it is not that of the paper.
+fn vehicle(scenario: &Scenario) -> String {
+    let vehicle = scenario.vehicle();
+    if *vehicle == VehicleParameters::default() {
+        return String::new();
+    }
+    format!("another vehicle than that of table 9 (m {} kg), ", vehicle.m)
 }
 
 /// What the evaluation must show, and whether it does.

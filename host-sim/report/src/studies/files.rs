@@ -3,25 +3,34 @@
 use std::path::Path;
 
 use super::OutputError;
-use crate::document::{Block, Report, write_bytes};
-use crate::plot::Figure;
+use crate::document::{Drawn, Report, write_bytes};
 
-/// A figure as `NAME.svg` and `NAME.png`.
-fn write_figure(directory: &Path, name: &str, figure: &Figure) -> Result<(), OutputError> {
-    let (svg, png) = (figure.to_svg()?, figure.to_png()?);
-    write_bytes(&directory.join(format!("{name}.svg")), svg)?;
-    Ok(write_bytes(&directory.join(format!("{name}.png")), png)?)
+/// Files of the figures, beside the drawings in the report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Pictures {
+    /// SVG.
+    #[default]
+    Drawings,
+    /// SVG, and its pixels as PNG.
+    #[cfg(feature = "png")]
+    AlsoPixels,
 }
 
-/// The figures of a report, and the report itself as `report.html`.
+/// The figures of a report with their captions, and the report itself as `report.html`.
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(report: &Report, directory: &Path) -> Result<(), OutputError> {
-    for block in report.sections.iter().flat_map(|section| &section.blocks) {
-        if let Block::Figure { name, figure, .. } = block {
-            write_figure(directory, name, figure)?;
+pub fn write(report: &Report, directory: &Path, pictures: Pictures) -> Result<(), OutputError> {
+    let (figures, page) = report.drawn()?;
+    for Drawn { name, caption, svg } in &figures {
+        let file = |ending: &str| directory.join(format!("{name}.{ending}"));
+        write_bytes(&file("svg"), svg)?;
+        write_bytes(&file("txt"), format!("{caption}\n"))?;
+        match pictures {
+            Pictures::Drawings => {}
+            #[cfg(feature = "png")]
+            Pictures::AlsoPixels => write_bytes(&file("png"), crate::plot::png(svg)?)?,
         }
     }
-    Ok(write_bytes(&directory.join("report.html"), report.to_html()?)?)
+    Ok(write_bytes(&directory.join("report.html"), page)?)
 }

@@ -37,7 +37,8 @@ fn broken_line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
     Series::through(label, style, &x, &y)
 }
 
-/// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %; none if t_p was given.
+/// Minus twice the log likelihood over t_p for the arm as assumed, up to where it no longer matters, with the level of 95 %, and
+/// the intervals for that arm and for any; none if t_p was given.
 fn delay_profile(found: &Identification) -> Option<Figure> {
     let profile = &found.delay_profile;
     let mut x = Vec::new();
@@ -55,11 +56,30 @@ fn delay_profile(found: &Identification) -> Option<Figure> {
     }
     let ends = [*x.first()?, *x.last()?];
     let mut series = Vec::new();
-    if let Some([low, high]) = found.parameters.t_p.interval_95 {
-        let ends = [[0.0, HIGHEST]; 2];
-        series.push(Series::interval("95 % interval", 5, &[low, high], &ends));
+    let assumed = found.at_t_nms.as_ref();
+    let narrow = assumed.and_then(|a| a.intervals_95.iter().find(|i| i.0 == "t_p"));
+    let any = match assumed {
+        Some(_) => "95 % interval, t_nms not known",
+        None => "95 % interval",
+    };
+    if let Some(interval) = found.parameters.t_p.interval_95 {
+        series.push(Series::interval(any, 5, &interval, &[[0.0, HIGHEST]; 2]));
     }
-    series.push(Series::through("profile", 0, &x, &y));
+    if let Some((_, [low, high])) = narrow {
+        let ends = [
+            (*low, 0.0),
+            (*low, HIGHEST),
+            (*low, f64::NAN),
+            (*high, 0.0),
+            (*high, HIGHEST),
+        ];
+        series.push(Series::line("95 % interval, t_nms as assumed", 2, ends.to_vec()));
+    }
+    let profile = match assumed {
+        Some(_) => "profile, t_nms as assumed",
+        None => "profile",
+    };
+    series.push(Series::through(profile, 0, &x, &y));
     series.push(Series::through("level of 95 %", 1, &ends, &[3.84, 3.84]));
     let y = Axis::new("-2 log L above optimum", "-").within(0.0, HIGHEST);
     Some(Axis::new("t_p", "s").figure([y.panel(series)]))
@@ -199,8 +219,15 @@ fn verdict_blocks(found: &Identification) -> Vec<Block> {
         }
         false => "The 95 % intervals, and what they would be if K_nms and t_nms were what is assumed.",
     };
-    let valley =
-        "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.";
+    let valley = match found.at_t_nms {
+        Some(_) => {
+            "Likelihood of the delay with all else at its best, the arm as assumed: one narrow valley, or the delay is not known. The \
+             wider interval holds for every arm, and for what the residuals leave open."
+        }
+        None => {
+            "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known."
+        }
+    };
     verdict.extend(shown("intervals", intervals(found), beside));
     verdict.extend(shown("delay_profile", delay_profile(found), valley));
     if !found.assumed.is_empty() {

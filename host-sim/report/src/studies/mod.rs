@@ -26,7 +26,7 @@ use haptic_log::trace::Sample;
 use haptic_sim::scenario::Scenario;
 
 pub use crate::document::SeriesFormat;
-pub use files::write;
+pub use files::{Pictures, write};
 
 /// Place of a row in a figure of rows.
 pub fn place(row: usize) -> f64 {

@@ -206,9 +206,9 @@ pub fn reliance_panel(
         .collect();
     let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
     let series = [
-        Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
-        Series::line("truth", 0, truth.to_vec()),
-        Series::line("estimate", 1, estimate.collect()),
+        Series::interval("K_hg by the ECU \u{b1} 2 deviations", 5, &places, &ends),
+        Series::line("K_hg of the driver", 0, truth.to_vec()),
+        Series::line("K_hg by the ECU", 1, estimate.collect()),
     ];
     Panel::new(title, Axis::new("K_hg", "-").within(-0.5, 1.5), series)
 }

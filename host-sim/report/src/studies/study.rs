@@ -1,5 +1,7 @@
 //! What a study with participants leaves: a row for each session, metrics by condition.
 
+mod figures;
+
 use std::path::Path;
 
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
@@ -22,13 +24,29 @@ pub fn report(results: &StudyResults) -> Report {
             session.name()
         )));
     }
-    let mut differences = vec![Block::Table(differences(results))];
+    let mut by_condition = vec![Block::Table(self::by_condition(results))];
+    let mut differences = vec![Block::Table(self::differences(results))];
+    if results.sessions.iter().any(|session| session.recorded.is_some()) {
+        let each = "A line for each participant, with the mean of the own repetitions that stayed on the road; black, the mean over those who have \
+                    a value.";
+        by_condition.insert(0, Block::figure("conditions", figures::conditions(results), each));
+    }
+    if !results.differences.is_empty() {
+        let paired = format!(
+            "Mean differences within participants with {} % intervals (Student's t), each for itself: not corrected for their number.",
+            results.level
+        );
+        differences.insert(
+            0,
+            Block::figure("differences", figures::differences(results), paired),
+        );
+    }
     if !results.repeated.is_empty() {
         differences.push(Block::Table(repeated(results)));
     }
     let sections = vec![
         Section::new("Sessions", each),
-        Section::new("By condition", vec![Block::Table(by_condition(results))]),
+        Section::new("By condition", by_condition),
         Section::new("Differences between conditions", differences),
     ];
     Report {
