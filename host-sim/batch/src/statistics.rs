@@ -99,7 +99,6 @@ impl Confidence {
     }
 
     /// Whether it is 95 %, of which JSON says nothing more.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
     #[must_use]
     pub fn is_usual(&self) -> bool {
         *self == Self::USUAL

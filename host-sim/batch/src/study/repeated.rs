@@ -94,7 +94,9 @@ impl Test {
         let pairs = (0..k).flat_map(|a| (0..k).map(move |b| (a, b)));
         let squares: f64 = pairs.map(|(a, b)| products(a, b).powi(2)).sum();
         let between = n as f64 * of_column.iter().map(|mean| (mean - whole).powi(2)).sum::<f64>();
-        if !(trace > 1e-20 * (between + whole * whole)) {
+        // Not a number is no scatter either.
+        let scatters = trace > 1e-20 * (between + whole * whole);
+        if !scatters {
             return None;
         }
         let [conditions, participants] = [k, n].map(|count| (count - 1) as f64);

@@ -128,20 +128,21 @@ fn matrix(b: Bytes<'_>, depth: u32) -> Result<(String, Value), RecordingError> {
     Ok((name, value))
 }
 
-pub(super) fn read(file: &[u8], time: Option<&Term>) -> Result<Table, RecordingError> {
-    let b = Bytes(file);
+/// Whether a file is of level 5, the only one that is read.
+fn check_level(file: &[u8]) -> Result<(), RecordingError> {
     if file.starts_with(b"MATLAB 7.3") {
         return Err("this is MATLAB 7.3 (HDF5): save it with -v7".into());
     }
-    match b.slice(124, 4) {
-        Ok([0, 1, b'I', b'M']) => {}
-        Ok([_, _, b'M', b'I']) => {
-            return Err("this MAT file is big-endian, which is not read".into());
-        }
-        _ => {
-            return Err("this is no MAT file of level 5: save it with -v6 or -v7".into());
-        }
+    match Bytes(file).slice(124, 4) {
+        Ok([0, 1, b'I', b'M']) => Ok(()),
+        Ok([_, _, b'M', b'I']) => Err("this MAT file is big-endian, which is not read".into()),
+        _ => Err("this is no MAT file of level 5: save it with -v6 or -v7".into()),
     }
+}
+
+pub(super) fn read(file: &[u8], time: Option<&Term>) -> Result<Table, RecordingError> {
+    let b = Bytes(file);
+    check_level(file)?;
     let mut found = Table::default();
     let (mut columns, mut units, mut sources) = (Vec::<Series>::new(), Vec::new(), Vec::new());
     let mut budget = Budget::new(file);
@@ -164,8 +165,9 @@ pub(super) fn read(file: &[u8], time: Option<&Term>) -> Result<Table, RecordingE
         };
         match matrix(contents, 0)? {
             (name, _) if name.is_empty() => {
-                let (fate, part) = (Fate::LeftOut, Part::Channel);
-                found.notes.count(fate, part, "without a name", place);
+                found
+                    .notes
+                    .count(Fate::LeftOut, Part::Channel, "without a name", place)
             }
             (name, Value::Numbers(values)) => {
                 budget.take(values.len())?;

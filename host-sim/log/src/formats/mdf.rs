@@ -608,13 +608,13 @@ fn tell_apart(groups: &mut [Group]) {
         }
     }
     let mut taken: HashSet<String> = groups.iter().map(|group| group.name.clone()).collect();
-    for i in 0..groups.len() {
+    for (i, group) in groups.iter_mut().enumerate() {
         if shared.contains(&i) {
-            let stem = match groups[i].name.as_str() {
+            let stem = match group.name.as_str() {
                 "" => "group",
                 name => name,
             };
-            groups[i].name = numbered(stem, i + 1, &mut taken);
+            group.name = numbered(stem, i + 1, &mut taken);
         }
     }
 }

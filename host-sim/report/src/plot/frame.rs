@@ -125,7 +125,7 @@ impl<'a> Frame<'a> {
             if self.figure.shared_label().is_none() {
                 layout = layout.with_x_label(&panel.y.label);
             }
-            layout.suppress_y_ticks = self.index % self.figure.columns() > 0;
+            layout.suppress_y_ticks = !self.index.is_multiple_of(self.figure.columns());
             return layout;
         }
         layout = layout.with_y_label(&panel.y.label);
