@@ -74,6 +74,9 @@ pub struct Balance {
     /// Steps of the wheel angle's sensor, rad, where most rows bring no other angle; else 0.
     #[serde(skip)]
     pub(crate) angle_step_rad: f64,
+    /// Distance of the rows, s.
+    #[serde(skip)]
+    pub(crate) row_s: f64,
 }
 
 /// A signal and its derivatives through the low-pass.
@@ -276,6 +279,7 @@ fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Opt
             offset_nm: [fit.weights[d - 2], error(d - 2)],
             seconds: rows.len() as f64 * dt,
             angle_step_rad: step_of(&log.wheel_angle_rad, rows),
+            row_s: dt,
         });
         if driver_late.abs() > 0.3 || guidance_late.abs() > 0.3 || (step.abs() < 5e-4 && more.abs() < 5e-4) {
             break;

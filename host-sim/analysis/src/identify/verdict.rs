@@ -180,7 +180,9 @@ fn of_instants(b: &Balance) -> Vec<Refutation> {
     };
     let coarse = (b.angle_step_rad / FINE_ANGLE_RAD).max(1.0);
     let [driver, error] = b.driver_late_s;
-    let driver_is = is_sure(driver, error) && driver.abs() > SMALL_DRIVER_DELAY_S * coarse;
+    // Rows far apart are joined by straight lines, which no delay below half of their distance is told from.
+    let least_s = (SMALL_DRIVER_DELAY_S * coarse).max(0.5 * b.row_s);
+    let driver_is = is_sure(driver, error) && driver.abs() > least_s;
     if driver_is {
         late("driver_torque_nm", "wheel_angle_rad", "t_d_late", b.driver_late_s);
     }
@@ -315,7 +317,7 @@ pub(crate) fn of_changed_sensor(
     record: [f64; 2],
     [before, after]: [&Balance; 2],
 ) -> Option<Refutation> {
-    if before.explained.min(after.explained) < BALANCE_CLOSE {
+    if before.explained.min(after.explained) < BALANCE_SEEN {
         return None;
     }
     let moved = |[was, error_was]: [f64; 2], [is, error]: [f64; 2]| {

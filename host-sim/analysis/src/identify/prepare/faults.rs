@@ -126,10 +126,11 @@ impl Examined {
             return;
         }
         let off = |k: usize| {
-            let from = k.saturating_sub(half).min(n - 2 * half - 1);
+            // As many rows to both sides: at the ends of a slope the middle one is not the median of the others.
+            let half = half.min(k).min(n - 1 - k);
             let mut window = [0.0; 2 * HALF_WINDOW + 1];
             let window = &mut window[..=2 * half];
-            window.copy_from_slice(&u[from..=from + 2 * half]);
+            window.copy_from_slice(&u[k - half..=k + half]);
             (u[k] - median(window)).abs()
         };
         // Where the signal hardly bends, its own neighbours say enough: the median is taken of those that may be one.

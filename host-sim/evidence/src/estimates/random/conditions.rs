@@ -77,7 +77,7 @@ macro_rules! conditions {
     };
 }
 
-/// With which a log is as it should be.
+/// Conditions under which a log is as it should be.
 pub(super) const HONEST: [RandomCondition; 46] = conditions! { true;
     Sensors, "noise of the lane signals", "mm and 0.1 mrad", 1.0, 30.0, |d, x| d.spoil(Stage::Sensor, move |r, random| {
         noise(&mut r.signals[E_Y], 1e-3 * x, 1, random);
@@ -164,7 +164,7 @@ pub(super) const HONEST: [RandomCondition; 46] = conditions! { true;
     Time, "standstill", "s", 5.0, 30.0, |d, x| d.spoil(Stage::Signal, move |r, random| r.stand(x, random));
 };
 
-/// With which something is wrong.
+/// Conditions that make something wrong.
 pub(super) const WRONG: [RandomCondition; 36] = conditions! { false;
     Sensors, "T_d times", "", 0.4, 0.9, |d, x| d.spoil(Stage::Sensor, move |r, _| r.scale(T_D, x));
     Sensors, "T_d times", "", 1.1, 2.0, |d, x| d.spoil(Stage::Sensor, move |r, _| r.scale(T_D, x));

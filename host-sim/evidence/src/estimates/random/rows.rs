@@ -40,7 +40,7 @@ impl Rows {
         DriveLog::from_columns([self.time_s, a, b, c, d, e], manual)
     }
 
-    /// As a file of a log; a value that is missing is left empty.
+    /// The file of a log; a value that is missing is left empty.
     pub(super) fn to_csv(&self) -> String {
         let mut text = COLUMNS.join(",") + "\n";
         for (k, time_s) in self.time_s.iter().enumerate() {

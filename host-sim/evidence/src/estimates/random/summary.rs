@@ -15,7 +15,7 @@ const ACCUSED_OF_100: f64 = 2.0;
 pub struct Share {
     /// How many.
     pub count: usize,
-    /// Of how many.
+    /// How many there are in all.
     pub of: usize,
     /// Wilson's 95 % interval of the share behind it; none of none.
     pub interval: Option<[f64; 2]>,
