@@ -329,8 +329,8 @@ fn what_is_mistyped_or_empty_is_answered_with_what_is_meant() {
             "did you mean e_theta_rad?",
         ),
         (
-            &["validate", "--corruptions", "1", "--only", "lane nois"],
-            "did you mean lane noise",
+            &["validate", "--corruptions", "1", "--only", "lame noise 10 mm, 1 mrad"],
+            "did you mean lane noise 10 mm, 1 mrad?",
         ),
         (
             &["validate", "--changes", "1", "--only", "K_d stps by half"],

@@ -19,7 +19,7 @@ pub struct FileArguments {
     /// Write also where files are that the command did not write
     #[arg(long, global = true)]
     force: bool,
-    /// Each figure also as PNG, where neither a report in HTML nor an SVG can be opened
+    /// Each figure also as PNG, where no SVG can be opened
     #[arg(long, global = true)]
     png: bool,
 }

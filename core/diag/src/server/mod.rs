@@ -1,8 +1,8 @@
 //! The server: sessions, the order in which a request is judged, and what a step has to do.
 //!
 //! A request is judged as ISO 14229-1 (7.5 and 8.7) has it: service, session, least length, sub-function, length, security,
-//! and then what the service asks for. Here: sessions, identification of the tester, reset. [`services`] has the others,
-//! [`writing`] what is written.
+//! and then what the service asks for. Here: sessions, identification of the tester, reset. `services` has the others,
+//! `writing` what is written.
 
 mod services;
 mod writing;

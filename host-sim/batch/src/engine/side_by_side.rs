@@ -109,7 +109,7 @@ impl Group<'_> {
     /// What `measure` makes of each run that is driven side by side; nothing of those that are rejected.
     ///
     /// # Errors
-    /// As [`Self::run_batch`], with what `measure` says.
+    /// A run that differs from the shipping ECU's; what `measure` says.
     pub fn measured<T>(
         &self,
         options: Options,
