@@ -329,7 +329,13 @@ fn what_is_mistyped_or_empty_is_answered_with_what_is_meant() {
             "did you mean e_theta_rad?",
         ),
         (
-            &["validate", "--corruptions", "1", "--only", "lame noise 10 mm, 1 mrad"],
+            &[
+                "validate",
+                "--corruptions",
+                "1",
+                "--only",
+                "lame noise 10 mm, 1 mrad",
+            ],
             "did you mean lane noise 10 mm, 1 mrad?",
         ),
         (
