@@ -82,8 +82,7 @@ pub(crate) fn installed() -> Result<PathBuf> {
     install(&make(true)?)
 }
 
-/// Builds the wheel with the command line in it: `to_ship`, or in the profile of the tests, which shares what is compiled with the
-/// README's first command.
+/// Builds the wheel with the command line in it: `to_ship`, or in the profile of the tests, which compiles the fastest.
 pub(crate) fn make(to_ship: bool) -> Result<PathBuf> {
     let dist = root().join("target/dist");
     let wheels = || {
