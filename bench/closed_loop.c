@@ -8,8 +8,9 @@
  *
  * Terms: a tick is 1 ms. A foot is the point of the centreline nearest to a point in the plane. Near and far
  * points lie v*t_n and v*t_f ahead along the direction of movement chi = psi + beta. Positive is left everywhere.
- * `--sensors exact` hands the law exact errors each tick; `--sensors paper` sends them at 120 Hz through protected
- * frames, and the torque comes back in one.
+ * `--sensors exact` hands the law exact errors each tick, and looks at the body each tick; `--sensors paper` takes the
+ * errors at 120 Hz and sends them through protected frames, the torque comes back in one, and the body is looked at with
+ * 200 Hz: as often as the simulator does.
  *
  * Above 500 lines because it is one file on purpose: a peer that a stranger compiles with one command and reads from
  * equation to trace, with nothing shared.
@@ -39,6 +40,7 @@ static const double TICK = 1e-3;           /* s: control period and plant step *
 static const double SPEED = 60.0 / 3.6;    /* m/s */
 static const double TORQUE_LIMIT = 5.0;    /* N.m, section 3.2 */
 static const double LANE_RATE = 120.0;     /* Hz, lane samples */
+enum { BODY_EVERY = 5 };                   /* ticks between looks at the body: 200 Hz */
 static const double RATE_CORNER = 10.0;    /* Hz, low-pass on the differenced 120 Hz samples; our choice */
 static const double MANUAL_K_D = 4.0;      /* section 5.1 */
 static const double DIVERGED_BEYOND = 50.0; /* m off the centreline */
@@ -120,7 +122,7 @@ static Road build_road(void)
 
 typedef struct {
     const Cell *cell;
-    double s, advance;      /* arc length of the foot, and its change in the last tick */
+    double s, advance;      /* arc length of the foot, and its change in a tick before the last look */
     double offset, heading; /* point relative to its foot, left positive; heading of the centreline there */
 } Foot;
 
@@ -129,11 +131,12 @@ static Foot foot_at(const Road *road, double s)
     return (Foot){.cell = road->cell, .s = s, .advance = 0};
 }
 
-/* Newton's method from where the last tick's advance leads: it starts about 1e-7 m off, so one step is exact. */
-static inline void project(const Road *road, Foot *f, double px, double py)
+/* Newton's method from where the advance leads in the ticks since the last look: after one tick it starts about 1e-7 m
+ * off, so one step is exact. */
+static inline void project(const Road *road, Foot *f, double px, double py, long ticks)
 {
     const Cell *last = road->cell + road->count - 1;
-    double from = f->s, s = from + f->advance, step;
+    double from = f->s, s = from + f->advance * (double)ticks, step;
     const Cell *c = f->cell;
     do {
         while (s > c->end && c < last)
@@ -153,7 +156,7 @@ static inline void project(const Road *road, Foot *f, double px, double py)
     } while (fabs(step) > 1e-6);
     f->cell = c;
     f->s = s;
-    f->advance = s - from;
+    f->advance = ticks ? (s - from) / (double)ticks : 0;
 }
 
 static inline double wrapped(double angle)
@@ -346,7 +349,7 @@ static inline double law_torque(const Law *l)
 typedef struct {
     hg_ecu ecu;
     uint8_t lanes, columns, hosts;
-    double next_lane, torque;
+    double torque;
     long frames, rejected;
 } Shipping;
 
@@ -358,13 +361,13 @@ static void shipping_send(Shipping *e, int32_t made, const hg_frame *f, uint32_t
 }
 
 /* A tick: what the sensors send, the ECU's step, and the torque as the actuator reads it from the frame. */
-static double shipping_step(Shipping *e, Link *command, long k, double e_y, double e_theta, double t_d, double phi)
+static double shipping_step(Shipping *e, Link *command, long k, bool picture, double e_y, double e_theta, double t_d,
+                            double phi)
 {
     const uint32_t now_us = (uint32_t)k * 1000u;
     hg_frame f;
     hg_step out;
-    if ((double)k * TICK >= e->next_lane) {
-        e->next_lane += 1 / LANE_RATE;
+    if (picture) {
         shipping_send(e, hg_lane_preview(e_y, e_theta, 0, 1, e->lanes++, &f), &f, now_us);
     }
     if (k % 2 == 0)
@@ -412,6 +415,7 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
     double px = 0, py = 0, c = 1, s = 0; /* centre of gravity; direction of movement */
     double line[DELAY_LINE] = {0}, e_y_integral = 0, e_y_before = 0, phi_target = 0, torque = 0;
     double k_d = o->k_d, k_hg = o->k_hg, next_lane = 0;
+    long last_picture = 0;
     Foot body = foot_at(road, 0), near = foot_at(road, SPEED * T_N), far = foot_at(road, SPEED * T_F);
     Foot guide_near = foot_at(road, SPEED * GT_N), guide_far = foot_at(road, SPEED * GT_F);
     Link lane = open_link(0x11), column = open_link(0x22), command = open_link(0x5A);
@@ -431,11 +435,13 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
 
     for (long k = 0; k != end; k++) {
         const double time = (double)k * TICK, chi = x[PSI] + x[BETA];
-        project(road, &far, px + SPEED * T_F * c, py + SPEED * T_F * s);
+        project(road, &far, px + SPEED * T_F * c, py + SPEED * T_F * s, 1);
         if (far.s >= road->length)
             break;
-        project(road, &near, px + SPEED * T_N * c, py + SPEED * T_N * s);
-        project(road, &body, px, py);
+        project(road, &near, px + SPEED * T_N * c, py + SPEED * T_N * s, 1);
+        const bool sees_body = !o->paper_sensors || k % BODY_EVERY == 0;
+        if (sees_body)
+            project(road, &body, px, py, o->paper_sensors ? BODY_EVERY : 1);
         if (!(fabs(body.offset) < DIVERGED_BEYOND)) {
             r.diverged = true;
             break;
@@ -458,12 +464,20 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
         /* guidance */
         double t_h = 0;
         if (o->guidance) {
-            project(road, &guide_near, px + SPEED * GT_N * c, py + SPEED * GT_N * s);
-            project(road, &guide_far, px + SPEED * GT_F * c, py + SPEED * GT_F * s);
-            const double ge_y = -guide_near.offset, ge_theta = wrapped(guide_far.heading - chi);
+            /* the first tick at or after each sample's due time */
+            const bool picture = !o->paper_sensors || time >= next_lane;
+            double ge_y = 0, ge_theta = 0;
+            if (picture) {
+                next_lane += 1 / LANE_RATE;
+                project(road, &guide_near, px + SPEED * GT_N * c, py + SPEED * GT_N * s, k - last_picture);
+                project(road, &guide_far, px + SPEED * GT_F * c, py + SPEED * GT_F * s, k - last_picture);
+                last_picture = k;
+                ge_y = -guide_near.offset;
+                ge_theta = wrapped(guide_far.heading - chi);
+            }
 #ifdef SHIPPING_ECU
             if (o->paper_sensors) {
-                torque = shipping_step(&shipping, &command, k, ge_y, ge_theta, x[T_D], x[PHI]);
+                torque = shipping_step(&shipping, &command, k, picture, ge_y, ge_theta, x[T_D], x[PHI]);
             } else
 #endif
             if (!o->paper_sensors) {
@@ -472,8 +486,7 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
             } else {
                 int16_t a, b;
                 uint16_t age;
-                if (time >= next_lane) { /* the first tick at or after each sample's due time */
-                    next_lane += 1 / LANE_RATE;
+                if (picture) {
                     Frame f = pack(&lane, 1, code(ge_y, E_Y_LSB), code(ge_theta, E_THETA_LSB), 0);
                     r.frames++;
                     if (unpack(&lane, &f, &a, &b, &age))
@@ -503,7 +516,7 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
             }
         }
 
-        if (body.s >= o->window_from && body.s <= o->window_to) {
+        if (sees_body && body.s >= o->window_from && body.s <= o->window_to) {
             r.window_ticks++;
             r.sum += fabs(body.offset);
             r.peak = fmax(r.peak, fabs(body.offset));

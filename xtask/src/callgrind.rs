@@ -14,7 +14,7 @@ pub(crate) struct Counts {
 }
 
 pub(crate) fn count() -> Result<Counts> {
-    let program = build_closed_loop()?;
+    let program = build_closed_loop(For::EveryMachine)?;
     // Of several `--toggle-collect` callgrind obeys the first alone.
     let (received, _) = collect(&program, "haptic_core::ecu::Ecu::receive")?;
     let (stepped, run) = collect(&program, "haptic_core::ecu::Ecu::step")?;
@@ -29,14 +29,22 @@ pub(crate) fn count() -> Result<Counts> {
     })
 }
 
+/// Which processors a program is compiled for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum For {
+    EveryMachine,
+    ThisMachine,
+}
+
 /// Builds `bench/closed_loop.rs` and returns the program.
-pub(crate) fn build_closed_loop() -> Result<String> {
-    build("closed_loop")
+pub(crate) fn build_closed_loop(processor: For) -> Result<String> {
+    build("closed_loop", processor)
 }
 
 /// Builds a program of `bench/` and returns it.
-pub(crate) fn build(example: &str) -> Result<String> {
-    let elf = crate::image::elf_of(tool::cargo().args([
+pub(crate) fn build(example: &str, processor: For) -> Result<String> {
+    let mut cargo = tool::cargo();
+    cargo.args([
         "build",
         "--profile",
         "dist",
@@ -44,9 +52,13 @@ pub(crate) fn build(example: &str) -> Result<String> {
         "haptic-guidance",
         "--example",
         example,
-        "--message-format=json-render-diagnostics",
-    ]))?;
-    Ok(elf.to_string_lossy().into_owned())
+    ]);
+    cargo.arg("--message-format=json-render-diagnostics");
+    if let For::ThisMachine = processor {
+        cargo.env("RUSTFLAGS", "-C target-cpu=native");
+        cargo.args(["--target-dir", "target/native"]);
+    }
+    Ok(crate::image::elf_of(&mut cargo)?.to_string_lossy().into_owned())
 }
 
 /// Runs the program under callgrind, counting only inside the function named; returns the count and what the

@@ -1,13 +1,14 @@
-//! How fast the closed loop runs, beside the same loop written in C and in NumPy (`bench/README.md`).
+//! How fast the closed loop runs, beside the same loop in C, NumPy, numba and JAX (`bench/README.md`).
 //!
 //! Processor time of one core, so a figure of this machine at this moment and held by no golden: the ratios are
 //! what travels. The programs run in turn, several rounds in one run; a round gives a ratio of what ran beside each
 //! other, and the median of the rounds counts.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, Result};
 use clap::Args;
-use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::{callgrind, tool, venv};
 
@@ -16,6 +17,55 @@ const REPEAT: &str = "5";
 
 /// C's options for the drive that ours makes.
 const SAME_DRIVE: [&str; 8] = ["--t-p", "0.1", "--k-d", "3", "--k-hg", "0.5", "--repeat", REPEAT];
+
+/// What is compared: the key of `--json` before `_ratio`, what is shown, and which program is held against which.
+const RATIOS: [(&str, &str, &str, &str); 10] = [
+    (
+        "like_for_like",
+        "our world with C's kind of ECU, over C",
+        "ours_light",
+        "c",
+    ),
+    (
+        "like_for_like_native",
+        "  the same, both for this processor (-march=native)",
+        "ours_light_native",
+        "c_native",
+    ),
+    (
+        "same_ecu",
+        "our world over C's, both with the shipping ECU",
+        "ours",
+        "c_with_ours",
+    ),
+    ("lanes", "lanes with every check, over C", "lanes", "c"),
+    ("lanes_avx2", "  the same with AVX2 at most", "lanes_avx2", "c"),
+    (
+        "lanes_portable",
+        "  the same with what every machine has",
+        "lanes_portable",
+        "c",
+    ),
+    (
+        "lanes_over_c_native",
+        "lanes over C with -march=native",
+        "lanes",
+        "c_native",
+    ),
+    (
+        "lanes_avx2_over_numba",
+        "lanes with AVX2 at most, over numba",
+        "lanes_avx2",
+        "numba",
+    ),
+    (
+        "lanes_avx2_over_jax",
+        "lanes with AVX2 at most, over JAX",
+        "lanes_avx2",
+        "jax",
+    ),
+    ("whole", "the whole of ours over the whole of C", "ours", "c"),
+];
 
 /// What `cargo xtask bench speed` is asked for.
 #[derive(Debug, Args)]
@@ -28,104 +78,143 @@ pub(crate) struct Options {
     rounds: u32,
 }
 
-/// The figures.
-#[derive(Debug, Serialize)]
-struct Figures {
-    ours_x_real_time: f64,
-    c_x_real_time: f64,
-    numpy_x_real_time: f64,
-    /// (a) Our world with C's kind of ECU over C.
-    like_for_like_ratio: f64,
-    /// (b) Our world with the shipping ECU over C's world with the shipping ECU.
-    same_ecu_ratio: f64,
-    /// (c) The lanes with every check over C, of one core, with the widest instructions of the machine.
-    lanes_ratio: f64,
-    lanes_x_real_time: f64,
-    /// The lanes with AVX2 at most, and with what every machine has, over C.
-    lanes_avx2_ratio: f64,
-    lanes_portable_ratio: f64,
-    /// The whole of ours over the whole of C, whose ECU is the law and the bus's protection alone.
-    whole_ratio: f64,
-    rounds: u32,
+/// A loop to time.
+struct Program {
+    /// Its key in [`RATIOS`], and in `--json` before `_x_real_time`.
+    key: &'static str,
+    shown: &'static str,
+    program: String,
+    arguments: Vec<&'static str>,
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
     tool::ensure(&[("gcc", "gcc"), ("python3", "python3-venv")])?;
-    let ours = callgrind::build_closed_loop()?;
-    let c = build_c("target/closed_loop_c", &[])?;
-    let c_with_ours = build_c_with_the_shipping_ecu()?;
-    let python = python()?;
-    let lanes = callgrind::build("lanes")?;
-    let [mut full, mut light, mut peer, mut peer_with_ours, mut numpy] = [const { Vec::new() }; 5];
-    let mut by_width = [const { Vec::new() }; 3];
+    let programs = programs()?;
+    let mut speeds: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for _ in 0..options.rounds {
-        full.push(times_real_time(&ours, &["--repeat", REPEAT])?);
-        peer.push(times_real_time(&c, &SAME_DRIVE)?);
-        for (speeds, width) in by_width.iter_mut().zip(["widest", "avx2", "portable"]) {
-            speeds.push(times_real_time(&lanes, &["--width", width, "--repeat", REPEAT])?);
+        for program in &programs {
+            speeds
+                .entry(program.key)
+                .or_default()
+                .push(times_real_time(program)?);
         }
-        light.push(times_real_time(&ours, &["--ecu", "c", "--repeat", REPEAT])?);
-        peer_with_ours.push(times_real_time(&c_with_ours, &SAME_DRIVE)?);
-        numpy.push(times_real_time(
-            &python,
-            &["bench/closed_loop.py", "--duration", "2"],
-        )?);
     }
-    let ratio = |a: &[f64], b: &[f64]| median(a.iter().zip(b).map(|(a, b)| a / b).collect());
-    let figures = Figures {
-        ours_x_real_time: median(full.clone()),
-        c_x_real_time: median(peer.clone()),
-        numpy_x_real_time: median(numpy),
-        like_for_like_ratio: ratio(&light, &peer),
-        same_ecu_ratio: ratio(&full, &peer_with_ours),
-        lanes_ratio: ratio(&by_width[0], &peer),
-        lanes_x_real_time: median(by_width[0].clone()),
-        lanes_avx2_ratio: ratio(&by_width[1], &peer),
-        lanes_portable_ratio: ratio(&by_width[2], &peer),
-        whole_ratio: ratio(&full, &peer),
-        rounds: options.rounds,
+    let ratio = |over: &str, under: &str| {
+        let rounds = speeds[over].iter().zip(&speeds[under]);
+        median(rounds.map(|(over, under)| over / under).collect())
     };
     if options.json {
+        let mut figures = Map::from_iter([("rounds".into(), options.rounds.into())]);
+        for program in &programs {
+            let speed = median(speeds[program.key].clone());
+            figures.insert(format!("{}_x_real_time", program.key), speed.into());
+        }
+        for (key, _, over, under) in RATIOS {
+            figures.insert(format!("{key}_ratio"), ratio(over, under).into());
+        }
         println!("{}", serde_json::to_string_pretty(&figures)?);
-    } else {
-        print(&figures);
+        return Ok(());
+    }
+    println!("{}", processor());
+    println!("one core, times real time (median of {} rounds)", options.rounds);
+    for program in &programs {
+        println!(
+            "  {:<58}{:>10.0}",
+            program.shown,
+            median(speeds[program.key].clone())
+        );
+    }
+    println!("ours over the peer, above 1: ours is faster");
+    for (_, shown, over, under) in RATIOS {
+        println!("  {shown:<58}{:>10.2}", ratio(over, under));
     }
     Ok(())
 }
 
-fn print(figures: &Figures) {
-    println!(
-        "one closed loop on one core, times real time (median of {} rounds)",
-        figures.rounds
-    );
-    for (name, speed) in [
-        ("ours (shipping ECU)", figures.ours_x_real_time),
-        ("C, gcc -O3 (law and protection alone)", figures.c_x_real_time),
-        ("NumPy/SciPy", figures.numpy_x_real_time),
-        ("ours in lanes (all of them together)", figures.lanes_x_real_time),
-    ] {
-        println!("  {name:<58}{speed:>10.0}");
-    }
-    println!("ours over the peer, above 1: ours is faster");
-    for (name, ratio) in [
-        (
-            "(a) our world with C's kind of ECU, over C",
-            figures.like_for_like_ratio,
+/// The name of this machine's processor, where it says it.
+fn processor() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text
+        .lines()
+        .find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    name.map_or("a processor that does not say its name".into(), |(_, name)| {
+        name.to_owned()
+    })
+}
+
+/// Builds all that is timed.
+fn programs() -> Result<Vec<Program>> {
+    let ours = callgrind::build_closed_loop(callgrind::For::EveryMachine)?;
+    let ours_native = callgrind::build_closed_loop(callgrind::For::ThisMachine)?;
+    let lanes = callgrind::build("lanes", callgrind::For::EveryMachine)?;
+    let c = build_c("target/closed_loop_c", &[])?;
+    let c_native = build_c("target/closed_loop_c_native", &["-march=native"])?;
+    let packages = ["numpy", "scipy", "numba", "jax"];
+    let python = venv::environment_of(&tool::root().join("target/python/speed"), &packages)?;
+    let python = python.to_string_lossy().into_owned();
+    let once = ["--repeat", REPEAT];
+    let lanes_of = |width| [["--width", width], once].concat();
+    let many = |library| [&["bench/many.py", library, "--copies", "10"], once.as_slice()].concat();
+    let program = |key, shown, program: &str, arguments: &[&'static str]| Program {
+        key,
+        shown,
+        program: program.into(),
+        arguments: arguments.into(),
+    };
+    Ok(vec![
+        program("ours", "ours (shipping ECU)", &ours, &once),
+        program("c", "C, gcc -O3 (law and protection alone)", &c, &SAME_DRIVE),
+        program(
+            "lanes",
+            "ours in lanes (all of them together)",
+            &lanes,
+            &lanes_of("widest"),
         ),
-        (
-            "(b) our world over C's, both with the shipping ECU",
-            figures.same_ecu_ratio,
+        program("lanes_avx2", "  with AVX2 at most", &lanes, &lanes_of("avx2")),
+        program(
+            "lanes_portable",
+            "  with what every machine has",
+            &lanes,
+            &lanes_of("portable"),
         ),
-        ("(c) lanes with every check, over C", figures.lanes_ratio),
-        ("    the same with AVX2 at most", figures.lanes_avx2_ratio),
-        (
-            "    the same with what every machine has",
-            figures.lanes_portable_ratio,
+        program(
+            "ours_light",
+            "ours with C's kind of ECU",
+            &ours,
+            &[["--ecu", "c"], once].concat(),
         ),
-        ("the whole of ours over the whole of C", figures.whole_ratio),
-    ] {
-        println!("  {name:<58}{ratio:>10.2}");
-    }
+        program(
+            "ours_light_native",
+            "  for this processor",
+            &ours_native,
+            &[["--ecu", "c"], once].concat(),
+        ),
+        program("c_native", "C, gcc -O3 -march=native", &c_native, &SAME_DRIVE),
+        program(
+            "c_with_ours",
+            "C with the shipping ECU",
+            &build_c_with_the_shipping_ecu()?,
+            &SAME_DRIVE,
+        ),
+        program(
+            "numba",
+            "numba, 240 drives (no frames, no checks)",
+            &python,
+            &many("numba"),
+        ),
+        program(
+            "jax",
+            "JAX, 240 drives (no frames, no checks)",
+            &python,
+            &many("jax"),
+        ),
+        program(
+            "numpy",
+            "NumPy and SciPy",
+            &python,
+            &["bench/closed_loop.py", "--duration", "2"],
+        ),
+    ])
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -160,12 +249,12 @@ pub(crate) fn python() -> Result<String> {
     Ok(python.to_string_lossy().into_owned())
 }
 
-fn times_real_time(program: &str, arguments: &[&str]) -> Result<f64> {
-    let text = tool::output(tool::command(program).args(arguments))?;
-    let report: Value = serde_json::from_str(&text).with_context(|| program.to_owned())?;
+fn times_real_time(program: &Program) -> Result<f64> {
+    let text = tool::output(tool::command(&program.program).args(&program.arguments))?;
+    let report: Value = serde_json::from_str(&text).with_context(|| program.shown)?;
     report["times_real_time"]
         .as_f64()
-        .with_context(|| format!("{program} names no times_real_time"))
+        .with_context(|| format!("{} names no times_real_time", program.shown))
 }
 
 #[cfg(test)]
