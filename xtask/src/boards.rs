@@ -182,6 +182,9 @@ fn longest(elf: &Path) -> Result<Figure> {
         longest.receive,
         longest.step
     );
+    for (what, rounds, instructions) in &longest.loops {
+        println!("  a loop, at most {rounds} times {instructions}: {what}");
+    }
     Ok(figure("longest tick, bound", "instructions", longest.tick(), 1))
 }
 

@@ -2,16 +2,18 @@
 //!
 //! Every instruction counts one, even if a condition skips it. At a branch the longer of both ways counts, whether or
 //! not any state takes it. A call counts as the longest path of the called function. A loop counts as many times as
-//! [`LOOPS`] allows; a loop in a function that is not in that table is an error. So the bound may be far above the
-//! real maximum, but never below it.
+//! [`LOOPS`] allows for the function of the source that has it, which the lines of debugging name; any other loop is an error.
+//! Memory that is cleared or copied counts by its number of bytes, which has to be a constant. So the bound may be far
+//! above the real maximum, but never below it.
 //!
 //! Not here: which functions may be on the path at all (`code`), and what a step really took (`host-sim ecu pil --count`).
 
+use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use object::{Object, ObjectSection};
 use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
@@ -19,24 +21,44 @@ use petgraph::graphmap::DiGraphMap;
 use crate::code::{self, CONTROLLER};
 use crate::tool;
 
-/// How many times a loop of a function can run, and why. The first entry is the beginning of the function's name.
-const LOOPS: &[(&str, u64, &str)] = &[
-    // The longest it clears or copies is the parameters' own memory.
+/// How often a loop of the source runs at most.
+#[derive(Debug, Clone, Copy)]
+enum Most {
+    Rounds(u64),
+    /// Once for each value of an array of this type, whose length stands behind it in the names of the functions.
+    Each(&'static str),
+    /// Once for each place of a ring of so many; a round may read several places, as the compiler has unrolled it.
+    Places(u64),
+}
+
+/// Loops of the source, by the function that has them, which may be inlined, and why they run no more often.
+const LOOPS: &[(&str, Most, &str)] = &[
     (
-        "__aeabi_mem",
-        64,
-        "words of the largest value that is cleared or copied as one",
-    ),
-    (
-        "compiler_builtins::int::specialized_div_rem",
-        64,
+        "specialized_div_rem",
+        Most::Rounds(64),
         "a bit of a 64-bit quotient each",
     ),
     (
-        "haptic_core::",
-        64,
-        "the history of torques has so many places, and nothing else that a step goes through more",
+        "line_direction",
+        Most::Rounds(6),
+        "each halves a ring of 32 places, until nothing is left",
     ),
+    ("records", Most::Each("faults::Fault, "), "each fault"),
+    ("unseen", Most::Each("faults::Fault, "), "each fault"),
+    (
+        "before",
+        Most::Places(64),
+        "outputs that the history of torques has",
+    ),
+];
+
+/// Functions that clear or copy memory, and the register that has the number of bytes.
+/// Their loops store words; a loop that stores less in a round has what a round of the widest leaves.
+const MEMORY: [(&str, &str); 4] = [
+    ("__aeabi_memclr", "r1"),
+    ("__aeabi_memset", "r1"),
+    ("__aeabi_memcpy", "r2"),
+    ("__aeabi_memmove", "r2"),
 ];
 
 /// Most frames that can arrive within a millisecond: a frame of eight bytes takes at least 222 us at 500 kbit/s, and
@@ -44,17 +66,19 @@ const LOOPS: &[(&str, u64, &str)] = &[
 pub(crate) const FRAMES_IN_A_TICK: u64 = 5;
 
 /// The bounds, in instructions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Longest {
     /// `Ecu::receive`, one frame.
     pub(crate) receive: u64,
     /// `Ecu::step`.
     pub(crate) step: u64,
+    /// Each loop on the way: what it is, how often it runs, and the instructions of a round.
+    pub(crate) loops: BTreeSet<(String, u64, u64)>,
 }
 
 impl Longest {
     /// A tick with as many frames as the bus can carry.
-    pub(crate) const fn tick(self) -> u64 {
+    pub(crate) const fn tick(&self) -> u64 {
         self.step + FRAMES_IN_A_TICK * self.receive
     }
 }
@@ -70,19 +94,53 @@ pub(crate) fn read(elf: &Path) -> Result<Longest> {
             .args(["-d", "-C", "--no-show-raw-insn"])
             .arg(elf),
     )?;
-    let mut code = Paths::read(&text, section.address(), section.data()?);
-    let [receive, step] = CONTROLLER.map(|root| code.of_root(root));
-    Ok(Longest {
-        receive: receive?,
-        step: step?,
-    })
+    let symbols = addr2line::Loader::new(elf).map_err(|error| anyhow!("{}: {error}", elf.display()))?;
+    let inlined = |address| {
+        let mut names = Vec::new();
+        let mut frames = symbols.find_frames(address).ok();
+        while let Some(Ok(Some(frame))) = frames.as_mut().map(|frames| frames.next()) {
+            names.extend(frame.function.and_then(|f| Some(f.demangle().ok()?.into_owned())));
+        }
+        names
+    };
+    Paths::read(&text, section.address(), section.data()?, &inlined).of_controller()
 }
+
+/// The functions of the source that an instruction is from, as they were inlined.
+type Inlined<'a> = &'a dyn Fn(u64) -> Vec<String>;
 
 /// An instruction: where, its mnemonic without its width, its operands.
 struct Instruction {
     address: u64,
     mnemonic: String,
     operands: String,
+}
+
+/// How often a loop runs at most that clears or copies.
+fn rounds_of_memory(members: &[&Instruction], bytes: u64, widest: &Cell<u64>) -> Result<u64> {
+    let stride = members.iter().map(|at| at.bytes_stored()).sum();
+    ensure!(stride > 0, "a loop that stores nothing");
+    let left = if stride < widest.get() {
+        bytes.min(widest.get() - 1)
+    } else {
+        bytes
+    };
+    widest.set(widest.get().max(stride));
+    Ok(left.div_ceil(stride))
+}
+
+impl Instruction {
+    /// Bytes that it stores.
+    fn bytes_stored(&self) -> u64 {
+        match self.mnemonic.as_str() {
+            "strb" => 1,
+            "strh" => 2,
+            "str" => 4,
+            "strd" => 8,
+            "stm" | "stmia" => 4 * (1 + self.operands.matches(',').count() as u64).saturating_sub(1),
+            _ => 0,
+        }
+    }
 }
 
 /// The instructions that may follow, as indices in the function, and the function that is called or jumped to.
@@ -97,11 +155,14 @@ struct Paths<'a> {
     /// Where the code begins, and its bytes, which hold the tables of branches too.
     start: u64,
     bytes: &'a [u8],
-    known: BTreeMap<u64, u64>,
+    inlined: Inlined<'a>,
+    /// By address, and by the bytes that are cleared or copied.
+    known: BTreeMap<(u64, Option<u64>), u64>,
+    loops: BTreeSet<(String, u64, u64)>,
 }
 
 impl<'a> Paths<'a> {
-    fn read(text: &str, start: u64, bytes: &'a [u8]) -> Self {
+    fn read(text: &str, start: u64, bytes: &'a [u8], inlined: Inlined<'a>) -> Self {
         let mut functions: BTreeMap<u64, (String, Vec<Instruction>)> = BTreeMap::new();
         let mut here = None;
         for line in text.lines() {
@@ -124,8 +185,19 @@ impl<'a> Paths<'a> {
             functions,
             start,
             bytes,
+            inlined,
             known: BTreeMap::new(),
+            loops: BTreeSet::new(),
         }
+    }
+
+    fn of_controller(mut self) -> Result<Longest> {
+        let [receive, step] = CONTROLLER.map(|root| self.of_root(root));
+        Ok(Longest {
+            receive: receive?,
+            step: step?,
+            loops: self.loops,
+        })
     }
 
     fn of_root(&mut self, root: &str) -> Result<u64> {
@@ -134,12 +206,13 @@ impl<'a> Paths<'a> {
             .iter()
             .find(|(_, (name, _))| name.starts_with(root));
         let address = *found.with_context(|| format!("{root} is not in the image"))?.0;
-        self.of_function(address)
+        self.of_function(address, None)
     }
 
-    /// The longest path through a function and the functions that it calls. Recursion was refused before, by `code`.
-    fn of_function(&mut self, address: u64) -> Result<u64> {
-        if let Some(known) = self.known.get(&address) {
+    /// The longest path through a function and the functions that it calls, or through one that clears or copies so many
+    /// bytes. Recursion was refused before, by `code`.
+    fn of_function(&mut self, address: u64, bytes: Option<u64>) -> Result<u64> {
+        if let Some(known) = self.known.get(&(address, bytes)) {
             return Ok(*known);
         }
         let (name, instructions) = self
@@ -151,21 +224,123 @@ impl<'a> Paths<'a> {
         let all = reached(&flows);
         let mut costs = vec![0; flows.len()];
         for place in &all {
-            let call = flows[*place].call;
-            costs[*place] = 1 + call.map_or(Ok(0), |call| self.of_function(call))?;
+            costs[*place] = 1;
+            if let Some(call) = flows[*place].call {
+                let bytes = self.bytes_of(call, &instructions, &flows, *place);
+                let bytes = bytes.with_context(|| name.clone())?;
+                costs[*place] += self.of_function(call, bytes)?;
+            }
         }
-        let bound = LOOPS.iter().find(|(start, ..)| name.starts_with(start));
+        let loops: RefCell<Vec<(String, u64, u64)>> = RefCell::default();
+        let widest = Cell::new(1);
+        let rounds = |members: &BTreeSet<usize>, once: &dyn Fn() -> Result<u64>| {
+            let members: Vec<_> = members.iter().map(|place| &instructions[*place]).collect();
+            let (what, rounds) = match bytes {
+                Some(bytes) => (
+                    format!("{name}, {bytes} bytes"),
+                    rounds_of_memory(&members, bytes, &widest)?,
+                ),
+                None => self.rounds(&members, &name)?,
+            };
+            let once = once()?;
+            loops.borrow_mut().push((what, rounds, once));
+            Ok(rounds * once)
+        };
         let graph = Graph {
             next: flows.into_iter().map(|flow| flow.next).collect(),
             costs,
-            rounds: bound.map(|(_, rounds, _)| *rounds),
+            rounds: &rounds,
         };
-        let longest = graph
-            .longest(&all, &BTreeSet::from([0]), &BTreeSet::new())
-            .with_context(|| name.clone())?;
+        let longest = || graph.longest(&all, &BTreeSet::from([0]), &BTreeSet::new());
+        if bytes.is_some() {
+            // Which loop is the widest is known behind the first time.
+            longest().with_context(|| name.clone())?;
+            loops.borrow_mut().clear();
+        }
+        let longest = longest().with_context(|| name.clone())?;
+        self.loops.extend(loops.into_inner());
         self.functions.insert(address, (name, instructions));
-        self.known.insert(address, longest);
+        self.known.insert((address, bytes), longest);
         Ok(longest)
+    }
+
+    /// What a loop is, and how often it runs at most.
+    fn rounds(&self, members: &[&Instruction], name: &str) -> Result<(String, u64)> {
+        let is_within = |address: u64, function: &str| {
+            let mut names = (self.inlined)(address);
+            names.push(name.to_owned());
+            let mut parts = names.iter().flat_map(|name| name.split("::"));
+            parts.any(|part| part.split('<').next() == Some(function))
+        };
+        let found = LOOPS
+            .iter()
+            .find(|(function, ..)| members.iter().all(|at| is_within(at.address, function)));
+        let Some((function, most, why)) = found else {
+            let first = members.first().map_or(0, |at| at.address);
+            let within = (self.inlined)(first).join(" in ");
+            bail!(
+                "a loop of {} instructions at {first:#x} ({within}), and no bound for it",
+                members.len()
+            );
+        };
+        let rounds = match most {
+            Most::Rounds(rounds) => *rounds,
+            Most::Each(of) => {
+                let names = members.iter().flat_map(|at| (self.inlined)(at.address));
+                let length = |name: String| {
+                    let (_, behind) = name.split_once(of)?;
+                    behind.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+                };
+                names
+                    .filter_map(length)
+                    .max()
+                    .with_context(|| format!("{function}: no array of {of}"))?
+            }
+            Most::Places(places) => {
+                let read = members
+                    .iter()
+                    .filter(|at| at.operands.contains(", lsl #"))
+                    .count();
+                places.div_ceil(read.max(1) as u64)
+            }
+        };
+        Ok((format!("{function}: {why}"), rounds))
+    }
+
+    /// The bytes that a function which is called at a place clears or copies, if it is one that does so.
+    fn bytes_of(
+        &self,
+        function: u64,
+        instructions: &[Instruction],
+        flows: &[Flow],
+        place: usize,
+    ) -> Result<Option<u64>> {
+        let name = self.functions.get(&function).map_or("", |(name, _)| name);
+        let Some((_, register)) = MEMORY.iter().find(|(start, _)| name.starts_with(start)) else {
+            return Ok(None);
+        };
+        // Back to where the register gets its constant, as long as nothing jumps in between.
+        for at in (0..place).rev() {
+            let is_target = (0..flows.len()).any(|from| from != at && flows[from].next.contains(&(at + 1)));
+            ensure!(!is_target, "{name} of a number of bytes that depends on the way");
+            let rest = instructions[at].operands.strip_prefix(register);
+            let Some(value) = rest.and_then(|rest| rest.strip_prefix(", ")) else {
+                continue;
+            };
+            let value = value.strip_prefix('#').and_then(|value| {
+                let digits = value.split_whitespace().next()?;
+                let hexadecimal = digits.strip_prefix("0x");
+                hexadecimal.map_or(digits.parse().ok(), |digits| u64::from_str_radix(digits, 16).ok())
+            });
+            let is_move = ["mov", "movs", "movw"].contains(&instructions[at].mnemonic.as_str());
+            return Ok(Some(value.filter(|_| is_move).with_context(|| {
+                format!(
+                    "{name} of a number of bytes that is no constant: {}",
+                    instructions[at].operands
+                )
+            })?));
+        }
+        bail!("{name} of a number of bytes from outside")
     }
 
     fn flows(&self, instructions: &[Instruction]) -> Result<Vec<Flow>> {
@@ -254,14 +429,14 @@ fn is_conditional(mnemonic: &str, base: &str) -> bool {
 }
 
 /// The instructions of a function, what each costs, and where each leads.
-struct Graph {
+struct Graph<'a> {
     next: Vec<Vec<usize>>,
     costs: Vec<u64>,
-    /// How many times a loop may run; `None` if there must be no loop.
-    rounds: Option<u64>,
+    /// What a loop of these instructions takes, by what it takes once.
+    rounds: &'a dyn Fn(&BTreeSet<usize>, &dyn Fn() -> Result<u64>) -> Result<u64>,
 }
 
-impl Graph {
+impl Graph<'_> {
     /// The longest path through `nodes` from one of `entries`; edges into `closed` are ignored.
     fn longest(
         &self,
@@ -290,9 +465,6 @@ impl Graph {
             let within = if members.len() == 1 && steps(first).all(|to| to != first) {
                 self.costs[first]
             } else {
-                let Some(rounds) = self.rounds else {
-                    bail!("a loop of {} instructions, and no bound for it", members.len());
-                };
                 let entered = nodes
                     .iter()
                     .filter(|node| !members.contains(node))
@@ -300,7 +472,8 @@ impl Graph {
                 let mut doors: BTreeSet<usize> = entered.filter(|to| members.contains(to)).collect();
                 doors.extend(entries.intersection(members));
                 ensure!(!doors.is_empty(), "a loop that nothing leads to");
-                rounds * self.longest(members, &doors, &closed.union(&doors).copied().collect())?
+                let closed = closed.union(&doors).copied().collect();
+                (self.rounds)(members, &|| self.longest(members, &doors, &closed))?
             };
             best.push(within + after);
         }
@@ -365,12 +538,14 @@ mod tests {
         let mut bytes = [0_u8; 0x40];
         // To 0x138 and 0x13a from 0x134, in halves; then a byte that fills.
         bytes[0x34..0x38].copy_from_slice(&[2, 3, 0, 0]);
-        let mut code = Paths::read(text, 0x100, &bytes);
-        let [receive, step] = CONTROLLER.map(|root| code.of_root(root));
-        Ok(Longest {
-            receive: receive?,
-            step: step?,
+        Paths::read(text, 0x100, &bytes, &|address| {
+            let is_loop = (0x13a..=0x13e).contains(&address);
+            is_loop
+                .then(|| "faults::records<array::IntoIter<faults::Fault, 21>>".to_owned())
+                .into_iter()
+                .collect()
         })
+        .of_controller()
     }
 
     #[test]
@@ -378,9 +553,51 @@ mod tests {
         let found = paths(TEXT).unwrap();
         // cmp, beq, three, bl, two of the call, pop.
         assert_eq!(found.receive, 2 + 3 + 1 + 2 + 1);
-        // tbb, nop, and 64 rounds of three.
-        assert_eq!(found.step, 2 + 64 * 3);
+        // tbb, nop, and a round of three for each fault.
+        assert_eq!(found.step, 2 + 21 * 3);
         assert_eq!(found.tick(), found.step + 5 * found.receive);
+    }
+
+    /// The table above names the lengths of two rings.
+    #[test]
+    fn rings_are_as_long_as_the_table_says() {
+        for (file, places) in [("ramp.rs", 64), ("motion_history.rs", 32)] {
+            let path = tool::root().join("core/src/safety").join(file);
+            let text = fs::read_to_string(path).unwrap();
+            assert!(text.contains(&format!("const RING: usize = {places};")), "{file}");
+        }
+    }
+
+    /// Twenty bytes, eight a round; what is left one by one.
+    const CLEARS: &str = "
+00000100 <haptic_core::ecu::Ecu::receive::h01>:
+ 100:      \tmovs\tr1, #0x14
+ 102:      \tbl\t0x120 <__aeabi_memclr4> @ imm = #0x1a
+ 106:      \tbx\tlr
+
+00000120 <__aeabi_memclr4>:
+ 120:      \tmovs\tr2, #0x0
+ 122:      \tstrd\tr2, r2, [r0], #8
+ 124:      \tsubs\tr1, #0x8
+ 126:      \tbne\t0x122 <__aeabi_memclr4+0x2> @ imm = #-0x8
+ 128:      \tstrb\tr2, [r0], #0x1
+ 12a:      \tbne\t0x128 <__aeabi_memclr4+0x8> @ imm = #-0x6
+ 12c:      \tbx\tlr
+
+00000130 <haptic_core::ecu::Ecu::step::h02>:
+ 130:      \tbx\tlr
+";
+
+    #[test]
+    fn memory_counts_by_its_bytes() {
+        // movs, bl, bx; movs, three rounds of three, seven of two, bx.
+        assert_eq!(paths(CLEARS).unwrap().receive, 3 + 1 + 3 * 3 + 7 * 2 + 1);
+        let says = |to: &str| format!("{:#}", paths(&CLEARS.replace("movs\tr1, #0x14", to)).unwrap_err());
+        assert!(says("mov\tr1, r4").contains("no constant"));
+        assert!(says("cmp\tr4, #0x1").contains("from outside"));
+        let jump =
+            "beq\t0x102 <haptic_core::ecu::Ecu::receive::h01+0x2> @ imm = #0x0\n 101:      \tmovs\tr1, #0x14";
+        assert!(says(jump).contains("depends on the way"));
     }
 
     #[test]
