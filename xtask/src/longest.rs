@@ -428,12 +428,14 @@ fn is_conditional(mnemonic: &str, base: &str) -> bool {
         .is_some_and(|condition| CONDITIONS.contains(&condition))
 }
 
+/// What a loop of these instructions takes, by what it takes once.
+type OfLoop<'a> = dyn Fn(&BTreeSet<usize>, &dyn Fn() -> Result<u64>) -> Result<u64> + 'a;
+
 /// The instructions of a function, what each costs, and where each leads.
 struct Graph<'a> {
     next: Vec<Vec<usize>>,
     costs: Vec<u64>,
-    /// What a loop of these instructions takes, by what it takes once.
-    rounds: &'a dyn Fn(&BTreeSet<usize>, &dyn Fn() -> Result<u64>) -> Result<u64>,
+    rounds: &'a OfLoop<'a>,
 }
 
 impl Graph<'_> {
