@@ -66,7 +66,7 @@ docs/glossary.md explains words and symbols.
 handover, reliance, validate and real-drives.
 
 Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or
-usage, or a program that is not installed.";
+usage, or a program that is not installed, 130 interrupted.";
 
 /// The first paragraph of each is its line in the program's `--help`, which `names` groups.
 #[derive(Debug, Subcommand)]
@@ -129,7 +129,7 @@ enum Command {
     ///
     /// CSV, Parquet, MAT, MDF4, candump, ASC, BLF.
     Convert(convert::Arguments),
-    /// The ECU itself and its bus: run, pil, live, parameters, bus
+    /// The ECU itself and its bus: run, pil, live, parameters, diag, bus
     ///
     /// In QEMU or on a board.
     #[command(subcommand)]

@@ -30,7 +30,6 @@ pub struct ResultArguments {
 pub struct LevelArgument {
     /// How often intervals hold what they are of: 0.5 to 0.9999
     #[arg(long, value_name = "SHARE", default_value = "0.95")]
-    /// What was given, or 95 %.
     pub level: Confidence,
 }
 

@@ -13,7 +13,7 @@ use super::{BadInput, Outcome};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// The ECU in QEMU on a bus that keeps the time of the wall, for any SLCAN client
+    /// The ECU in QEMU on a bus in real time, for any SLCAN client
     Run(run::Arguments),
     /// One scenario with the ECU's image in QEMU or on a board, every frame compared with the desktop's
     Pil(pil::Arguments),
