@@ -1,7 +1,7 @@
 //! Tables of others at their edges: what is read, and what is left out in words. The files `kinds` were made with pyarrow, SciPy and
 //! asammdf; unless it is said otherwise, the numbers are those that pyarrow, SciPy, asammdf or Python's csv read in the same file.
 
-#![cfg(feature = "parquet")]
+#![cfg(all(feature = "mdf", feature = "parquet"))]
 
 use std::path::Path;
 
