@@ -1,10 +1,13 @@
 //! Every number of the DBC file beside the layout: ranges, attributes, and those in comments, held against the code's lists and
 //! constants. A number that nothing holds fails.
 
-use can_dbc::{AttributeValue, Comment, Dbc, MessageId, NumericValue, ValueDescription};
+use can_dbc::{AttributeValue, Comment, Dbc, Message, MessageId, NumericValue, ValueDescription};
+use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Guidance, MESSAGES, TIMEOUT};
+use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::{PARAMETERS, Params};
-use haptic_core::quantity::Micros;
+use haptic_core::ecu::{Boot, Ecu};
+use haptic_core::quantity::{Instant, Micros};
 use haptic_core::safety::hands;
 use haptic_core::service::download::UNLOCK_MS;
 
@@ -47,8 +50,11 @@ fn a_range_holds_what_its_bits_and_its_names_say() {
                 is_float || (low >= least && high < most),
                 "{name}: {low} to {high}"
             );
-            // The start value of every signal is 0.
-            assert!(min <= 0.0 && max > 0.0, "{name}: {min} to {max}");
+            let start = start_value(message, name);
+            assert!(
+                (low..=high).contains(&start),
+                "{name}: {start} outside {low} to {high}"
+            );
             let codes = dbc.value_descriptions.iter().find_map(|values| match values {
                 ValueDescription::Signal {
                     name: own,
@@ -98,7 +104,6 @@ fn the_attributes_say_how_the_bus_runs() {
     };
     assert_eq!(of_bus("BusType").value, AttributeValue::String("CAN".into()));
     assert!(TEXT.contains("BA_ \"Baudrate\" 500000;") && TEXT.contains("classic CAN, 500 kbit/s"));
-    assert!(TEXT.contains("BA_DEF_DEF_ \"GenSigStartValue\" 0;"));
     let choices = TEXT
         .split_once("\"GenMsgSendType\" ENUM ")
         .unwrap()
@@ -127,6 +132,62 @@ fn the_attributes_say_how_the_bus_runs() {
             message.name
         );
     }
+}
+
+/// The bits that a signal starts with, as a tool that plays the bus takes them: of its attribute, or the attribute's default.
+fn start_value(message: &Message, name: &str) -> f64 {
+    let MessageId::Standard(id) = message.id else {
+        panic!("{name}: 29 bits")
+    };
+    let own = format!("BA_ \"GenSigStartValue\" SG_ {id} {name} ");
+    let value = TEXT
+        .split_once(&own)
+        .or_else(|| TEXT.split_once("BA_DEF_DEF_ \"GenSigStartValue\" "));
+    let (_, rest) = value.unwrap();
+    rest.split(';').next().unwrap().parse().unwrap()
+}
+
+/// The first frame of every cyclic message of an ECU that nobody sends anything to yet: all inputs are timed out.
+#[test]
+fn a_signal_starts_as_the_ecu_first_sends_it() {
+    let dbc = dbc();
+    let time = |ms: u32| Instant::from_us(1000 * ms);
+    let mut ecu = Ecu::new(Some(&Setup::PAPER), Boot::default(), time(0));
+    let mut first: Vec<Frame> = Vec::new();
+    for ms in 1..=2000 {
+        let step = ecu.step(time(ms));
+        let sent = [step.guidance]
+            .into_iter()
+            .chain(step.others)
+            .chain(ecu.background_step());
+        for frame in sent {
+            if first.iter().all(|known| known.id() != frame.id()) {
+                first.push(frame);
+            }
+        }
+    }
+    let mut heard = Vec::new();
+    for frame in &first {
+        let id = MessageId::Standard(frame.id());
+        let message = dbc.messages.iter().find(|message| message.id == id).unwrap();
+        if IF_ACTIVE.contains(&message.name.as_str()) {
+            continue;
+        }
+        heard.push(message.name.as_str());
+        // A CRC is that of the frame, whatever is in it.
+        let signals = message
+            .signals
+            .iter()
+            .filter(|signal| !signal.name.ends_with("_Crc"));
+        for signal in signals {
+            let bits = (0..signal.size).map(|i| (i, signal.start_bit + i));
+            let bits = bits.map(|(i, bit)| u64::from(frame.data()[bit as usize / 8] >> (bit % 8) & 1) << i);
+            let bits: u64 = bits.sum();
+            let start = start_value(message, &signal.name);
+            assert_eq!(bits as f64, start, "{}", signal.name);
+        }
+    }
+    assert_eq!(heard, ["Guidance", "Telemetry"]);
 }
 
 /// A number with the unit that the comments write.

@@ -60,6 +60,7 @@ fn a_comparison_leaves_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_file
     }
     for file in [
         "drives.csv",
+        #[cfg(feature = "parquet")]
         "drives.parquet",
         "report.html",
         "matrix-worst_peak_after_loss_m.svg",

@@ -125,7 +125,22 @@ fn names_units_and_separators_of_others_are_read() {
     assert!(said.contains("speed_m_per_s"), "{said}");
 }
 
+/// The first command does not compile Parquet: it says how to have it.
+#[test]
+fn a_parquet_file_is_read_by_a_build_that_has_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = host_sim(directory.path(), &["convert", "x.parquet"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(
+        said.contains("--features full"),
+        !cfg!(feature = "parquet"),
+        "{said}"
+    );
+}
+
 /// The file has what polars writes by default.
+#[cfg(feature = "parquet")]
 #[test]
 fn a_parquet_file_of_polars_is_listed_with_its_units() {
     let directory = tempfile::tempdir().unwrap();

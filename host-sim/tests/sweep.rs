@@ -55,7 +55,13 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn files(folder: &Path, out: &str) -> Vec<Vec<u8>> {
-    let names = ["drives.csv", "drives.parquet", "summary.json", "sweep.toml"];
+    let names = [
+        "drives.csv",
+        #[cfg(feature = "parquet")]
+        "drives.parquet",
+        "summary.json",
+        "sweep.toml",
+    ];
     names
         .map(|name| fs::read(folder.join(out).join(name)).unwrap())
         .to_vec()

@@ -25,7 +25,7 @@ pub(crate) const BUDGETS: [(&str, usize); 24] = [
     ("host-sim/batch", 9_000),
     ("host-sim/campaign", 4_000),
     ("host-sim/evidence", 6_900),
-    ("host-sim/log", 5_700),
+    ("host-sim/log", 5_800),
     ("host-sim/metrics", 600),
     ("host-sim/pil", 2_200),
     ("host-sim/report", 5_900),

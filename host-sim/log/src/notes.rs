@@ -40,6 +40,8 @@ pub enum Part {
     Row,
     /// A time stamp.
     Stamp,
+    /// A statement of a DBC file.
+    Statement,
     /// A single value.
     Value,
 }
@@ -167,6 +169,7 @@ impl Note {
             Part::Object => "object",
             Part::Row => "row",
             Part::Stamp => "time stamp",
+            Part::Statement => "statement",
             Part::Value => "value",
         };
         let plural = if self.count == 1 { "" } else { "s" };

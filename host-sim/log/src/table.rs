@@ -47,12 +47,12 @@ pub enum TableError {
     },
 }
 
-/// What a text needs to be a number, where it is a decimal comma.
+/// What a text needs to be a number, where that is clear.
 fn hint(text: &str) -> &'static str {
-    if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
-        ": the decimal sign is a point"
-    } else {
-        ""
+    match (text.parse(), text.replacen(',', ".", 1).parse::<f64>()) {
+        (Ok(value), _) if is_beyond(text, value) => ": the largest is 1.8e308",
+        (Err(_), Ok(_)) => ": the decimal sign is a point",
+        _ => "",
     }
 }
 
@@ -289,11 +289,19 @@ const NOTHING: [&str; 12] = [
     "", "-", "--", "na", "n/a", "#n/a", "<na>", "nan", "nil", "none", "null", "missing",
 ];
 
-/// A field as a number: NaN where it says that there is none, nothing where it is a text.
+/// A field as a number: NaN where it says that there is none, nothing where it is a text, or digits beyond all numbers.
 #[must_use]
 pub fn number(field: &str) -> Option<f64> {
     let nothing = || NOTHING.contains(&field.trim().to_ascii_lowercase().as_str());
-    field.parse().ok().or_else(|| nothing().then_some(f64::NAN))
+    match field.parse() {
+        Ok(value) => Some(value).filter(|_: &f64| !is_beyond(field, value)),
+        Err(_) => nothing().then_some(f64::NAN),
+    }
+}
+
+/// Whether digits give no finite number; the word `inf` is one.
+fn is_beyond(field: &str, value: f64) -> bool {
+    value.is_infinite() && field.contains(|c: char| c.is_ascii_digit())
 }
 
 /// A number with so many digits after the point. A zero has no sign.

@@ -11,7 +11,7 @@
 use std::fmt;
 use std::io::{self, Read, Write};
 
-use crate::table::{TableError, TableReader, TableWriter, fixed};
+use crate::table::{TableError, TableReader, TableWriter, fixed, number};
 
 /// What the values of a channel belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -201,15 +201,11 @@ impl Trace {
             let mut sample = Sample::default();
             for (channel, place) in CHANNELS.iter().zip(&places) {
                 let text = place.map(|place| row.field(place)).unwrap_or_default();
-                let value = if text.is_empty() {
-                    f64::NAN
-                } else {
-                    text.parse().map_err(|_| TableError::NotANumber {
-                        line: row.line,
-                        column: channel.name.into(),
-                        text: text.to_string(),
-                    })?
-                };
+                let value = number(&text).ok_or_else(|| TableError::NotANumber {
+                    line: row.line,
+                    column: channel.name.into(),
+                    text: text.to_string(),
+                })?;
                 (channel.set)(&mut sample, value);
             }
             samples.push(sample);

@@ -432,16 +432,119 @@ fn signals_of_one_name_in_a_message_are_told_apart() {
     assert_eq!(notes(&found), [said]);
 }
 
-/// A mistake in a DBC file is one sentence with its place.
+/// A DBC file of which no message is understood is one sentence with the place of the first mistake.
 #[test]
-fn a_dbc_file_that_is_not_understood_is_refused_with_its_line() {
-    let dbc = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A\nBO_ 37 M: 8 A\nBA_DEF_ BO_ \"Send\" ENUM;\n";
+fn a_dbc_file_without_a_message_is_refused_with_its_line() {
+    let dbc = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A\n\nBA_DEF_ BO_ \"Send\" ENUM;\n";
     let error = dbc::parse(dbc.as_bytes()).unwrap_err().to_string();
     assert!(
         error.starts_with("the DBC file is not understood: line 6, column "),
         "{error}"
     );
     assert!(!error.contains('\n') && error.contains("expected"), "{error}");
+    for text in ["", "nonsense", "\"", "BO_ 37 M; 8 A\n SG_ A"] {
+        let none = dbc::channels(
+            &log("x.log", b"(0.0) can0 025#64\n".to_vec()),
+            text.as_bytes(),
+            None,
+        );
+        assert!(none.is_err(), "{text:?}");
+    }
+}
+
+/// What is wrong in a DBC file takes no other message along: a byte of 0x64 is 100 for those that are left.
+#[test]
+fn a_statement_that_is_not_understood_takes_nothing_else_along() {
+    let begin = "\u{feff}VERSION \"\"\nNS_ :\n\tCM_\n\tBO_TX_BU_\nBS_:\nBU_: A\n";
+    let signals = " SG_ V : 0|8@1+ (1,0) [0|0] \"\" A\n SG_ W : 8|8@1+ (1,0) [0|0] \"\" A\n";
+    let (first, second) = (
+        format!("BO_ 37 M: 8 A\n{signals}"),
+        "BO_ 38 N: 8 A\n SG_ X : 0|8@1+ (1,0) [0|0] \"\" A\n",
+    );
+    let read = |body: &str| {
+        let text = "(0.0) can0 025#6432\n(0.1) can0 026#64\n(0.2) can0 025#6432\n";
+        dbc::channels(
+            &log("x.log", text.into()),
+            format!("{begin}{body}").as_bytes(),
+            None,
+        )
+        .unwrap()
+    };
+    let whole = read(&format!("{first}{second}"));
+    assert!(whole.notes.is_empty());
+    assert_eq!(values(&whole, "V"), [100.0, 100.0]);
+    let not = "the DBC file's text is not understood";
+    let statement = |line: usize| format!("1 statement left out: {not}, in line {line}");
+    let channel = |name: &str| format!("1 channel ({name}) left out: {not}");
+    // What is wrong, what is said, and what is left of V, W and X.
+    let is = [
+        [true, true, true],
+        [false, true, true],
+        [false, false, true],
+        [true, true, false],
+    ];
+    for (body, said, left) in [
+        (
+            format!("{first}{second}BA_DEF_ BO_ \"Send\" ENUM;\n"),
+            statement(12),
+            is[0],
+        ),
+        (format!("BU_SG_ nothing\n{first}{second}"), statement(7), is[0]),
+        // An open quote, behind which an odd number of them stands.
+        (format!("CM_ \"open\n{first}{second}"), statement(7), is[0]),
+        (
+            format!("{first}CM_ \"a\nBO_ 9 x\";;\n{second}"),
+            statement(10),
+            is[0],
+        ),
+        (
+            format!("{first}{second}").replacen("0|8@1+ (1,0)", "0|8@1+ (1;0)", 1),
+            channel("V"),
+            is[1],
+        ),
+        (
+            format!("{first}{second}").replacen("SG_ V :", "SG_ V:0|", 1),
+            channel("V"),
+            is[1],
+        ),
+        (
+            format!("{first}{second}SIG_VALTYPE_ 37 V : 7;\n"),
+            channel("V"),
+            is[1],
+        ),
+        (
+            format!("{first}{second}SG_MUL_VAL_ 38 X V 1;\n"),
+            channel("X"),
+            is[3],
+        ),
+        (
+            format!("{first}{second}").replace("BO_ 37", "BO_ -37"),
+            channel("M"),
+            is[2],
+        ),
+        (
+            format!("{first}{second}").replace("BO_ 38", "BO_ 4294967296"),
+            channel("N"),
+            is[3],
+        ),
+        (
+            format!("{first}{second}").replacen("(1,0)", "(1e400,0)", 1),
+            "1 channel (V) left out: its factor or offset is beyond all numbers".into(),
+            is[1],
+        ),
+    ] {
+        let found = read(&body);
+        assert!(notes(&found).contains(&said), "{body}: {:?}", notes(&found));
+        for (name, is_left) in ["V", "W", "X"].into_iter().zip(left) {
+            assert_eq!(found.find(name).is_ok(), is_left, "{body}: {name}");
+        }
+        if left[1] {
+            assert_eq!(values(&found, "W"), [50.0, 50.0], "{body}");
+        }
+        if left[2] {
+            assert_eq!(values(&found, "X"), [100.0], "{body}");
+        }
+    }
 }
 
 /// python-can reads 1992 of 3000 frames. Cut at any other place the file is read as far as it goes, and says so.

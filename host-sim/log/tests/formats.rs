@@ -58,6 +58,7 @@ fn frames() -> Vec<BusFrame> {
 const TABLES: &[&str] = &[
     "csv",
     "mat",
+    #[cfg(feature = "mdf")]
     "mf4",
     #[cfg(feature = "parquet")]
     "parquet",

@@ -1,7 +1,7 @@
 //! Tables of others at their edges: what is read, and what is left out in words. The files `kinds` were made with pyarrow, SciPy and
 //! asammdf; unless it is said otherwise, the numbers are those that pyarrow, SciPy, asammdf or Python's csv read in the same file.
 
-#![cfg(feature = "parquet")]
+#![cfg(all(feature = "mdf", feature = "parquet"))]
 
 use std::path::Path;
 
@@ -287,6 +287,7 @@ fn a_column_that_is_there_twice_is_refused_where_it_is_asked_for() {
         found.find("a").unwrap_err().to_string(),
         "channel a is there twice"
     );
+    assert_eq!(names(&found), ["a", "b", "a"]);
     assert_eq!(values(&found, "b"), [2.0, 2.0]);
     assert_eq!(
         formats::to_csv(found).unwrap_err().to_string(),
@@ -294,6 +295,9 @@ fn a_column_that_is_there_twice_is_refused_where_it_is_asked_for() {
     );
     let twice = csv("time_s,a,time_s\n0,1,0\n1,1,1\n").unwrap_err();
     assert_eq!(twice, "channel time_s is there twice");
+    // Their units tell them apart, and stand in the heading once.
+    let text = "time_s,a [m],a [deg]\n0,1,2\n1,1,2\n";
+    assert_eq!(formats::to_csv(csv(text).unwrap()).unwrap(), text.as_bytes());
 }
 
 #[test]

@@ -19,7 +19,7 @@ use super::progress::{Threads, styled};
 use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, print, width};
 
-const OUT: &str = "Directory of the sweep: finished chunks, the table (drives.csv, drives.parquet), summary, figures, report. A sweep that was interrupted goes on where it was";
+const OUT: &str = "Directory of the sweep: finished chunks, the table (drives.csv; drives.parquet in a build with Parquet), summary, figures, report. A sweep that was interrupted goes on where it was";
 
 #[derive(Debug, Args)]
 #[command(mut_arg("out", |out| out.default_value("out/sweep").help(OUT)))]

@@ -163,7 +163,9 @@ pub(super) fn write(group: &Group, out: impl Write) -> Result<(), RecordingError
 /// A table with its heading: the names of the channels, with the unit in brackets where the name does not say it.
 pub(super) fn begin<W: Write>(out: W, channels: &[Series]) -> Result<TableWriter<W>, RecordingError> {
     let names = channels.iter().map(|channel| {
-        let said = units::of_name(&channel.name) == Some(channel.unit.as_str());
+        let unit = units::of_name(&channel.name);
+        let unit = unit.or_else(|| Some(units::in_brackets(&channel.name)?.1));
+        let said = unit == Some(channel.unit.as_str());
         if said || ["", "1"].contains(&channel.unit.as_str()) {
             channel.name.clone()
         } else {

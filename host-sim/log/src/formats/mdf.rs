@@ -1,12 +1,10 @@
-//! ASAM MDF 4. The crate mdf4-rs writes. It does not read: it takes a file's own word for where its blocks end, and panics on
-//! a damaged one; it reads no compressed records, and none that straddle blocks.
+//! ASAM MDF 4. The crate mdf4-rs writes (`mdf_write`). It does not read: it takes a file's own word for where its blocks end, and
+//! panics on a damaged one; it reads no compressed records, and none that straddle blocks.
 //!
 //! Read are sorted and unsorted files, plain or with deflated blocks, numbers with every conversion but formulas, and the
 //! fields of structures; invalid values are NaN. Left out by name are texts, bytes, arrays and groups without a time.
 
 use std::collections::{HashMap, HashSet};
-
-use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 
 use super::bytes::{Budget, Bytes, half};
 use super::{Reading, mdf_bus, numbered};
@@ -15,7 +13,8 @@ use crate::recording::{Group, Recording, RecordingError, Series};
 use crate::units;
 
 const HEAD: u64 = 24;
-const SOURCE: &str = "source: ";
+/// What a comment begins with that says where a channel comes from.
+pub(super) const SOURCE: &str = "source: ";
 
 /// A block: its kind, its links, and where its data begin and end.
 struct Block<'a> {
@@ -750,45 +749,4 @@ impl Found<'_> {
             ..Group::default()
         }))
     }
-}
-
-pub(super) fn write(recording: &Recording) -> Result<Vec<u8>, RecordingError> {
-    let made = || -> mdf4_rs::Result<Vec<u8>> {
-        let mut file = MdfWriter::in_memory();
-        file.init_mdf_file()?;
-        for group in &recording.groups {
-            let id = file.add_channel_group(None, |_| {})?;
-            file.set_channel_group_name(&id, &group.name)?;
-            let time = Series {
-                name: "time_s".into(),
-                unit: "s".into(),
-                source: "clock".into(),
-                values: Vec::new(),
-            };
-            let mut before: Option<String> = None;
-            for (i, channel) in std::iter::once(&time).chain(&group.channels).enumerate() {
-                let made = file.add_channel(&id, before.as_deref(), |block| {
-                    block.name = Some(channel.name.clone());
-                    block.data_type = DataType::FloatLE;
-                    block.bit_count = 64;
-                })?;
-                if i == 0 {
-                    file.set_time_channel(&made)?;
-                }
-                file.set_channel_unit(&made, &channel.unit)?;
-                file.set_channel_comment(&made, &format!("{SOURCE}{}", channel.source))?;
-                before = Some(made);
-            }
-            file.start_data_block_for_cg(&id, 0)?;
-            for (k, time_s) in group.time_s.iter().enumerate() {
-                let values = std::iter::once(*time_s).chain(group.channels.iter().map(|c| c.values[k]));
-                let record: Vec<DecodedValue> = values.map(DecodedValue::Float).collect();
-                file.write_record(&id, &record)?;
-            }
-            file.finish_data_block(&id)?;
-        }
-        file.finalize()?;
-        Ok(file.into_inner().into_inner())
-    };
-    made().map_err(|e| RecordingError(format!("{e:?}")))
 }

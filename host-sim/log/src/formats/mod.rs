@@ -5,8 +5,8 @@
 //! | `.csv` | a table; units in the name or in brackets behind it | yes | yes |
 //! | `.parquet` | a table; units in the file's metadata (feature `parquet`) | yes | yes |
 //! | `.mat` | MATLAB level 5, vectors with a struct `units` | yes | yes |
-//! | `.mf4` | ASAM MDF 4 | yes | yes |
-//! | `.mcap` | MCAP, JSON messages | no | yes |
+//! | `.mf4` | ASAM MDF 4 (written with feature `mdf`) | yes | yes |
+//! | `.mcap` | MCAP, JSON messages (feature `mcap`) | no | yes |
 //! | `.log` | candump | frames | frames |
 //! | `.asc`, `.blf` | Vector's logs | frames | frames |
 //!
@@ -25,6 +25,8 @@ mod mat;
 mod mcap;
 mod mdf;
 mod mdf_bus;
+#[cfg(feature = "mdf")]
+mod mdf_write;
 #[cfg(feature = "parquet")]
 mod parquet;
 pub mod protection;
@@ -50,12 +52,14 @@ pub enum Format {
     /// `.csv`
     Csv,
     /// `.parquet`
+    #[cfg(feature = "parquet")]
     Parquet,
     /// `.mat`
     Mat,
     /// `.mf4`
     Mdf4,
     /// `.mcap`
+    #[cfg(feature = "mcap")]
     Mcap,
     /// `.log`
     Candump,
@@ -68,6 +72,7 @@ pub enum Format {
 /// Extensions and their formats; the first of a format is the usual one.
 const EXTENSIONS: &[(&str, Format)] = &[
     ("csv", Format::Csv),
+    #[cfg(feature = "parquet")]
     ("parquet", Format::Parquet),
     ("mat", Format::Mat),
     ("mf4", Format::Mdf4),
@@ -80,6 +85,17 @@ const EXTENSIONS: &[(&str, Format)] = &[
     ("blf", Format::Blf),
 ];
 
+/// How to have what the first command does not compile.
+const LARGER: &str = "which would make the first build longer: build host-sim with `--features full`, as in \
+                      cargo run --release -p host-sim --features full -- convert IN OUT";
+/// Extensions that only a larger build knows.
+const ELSEWHERE: &[&str] = &[
+    #[cfg(not(feature = "parquet"))]
+    "parquet",
+    #[cfg(not(feature = "mcap"))]
+    "mcap",
+];
+
 impl Format {
     /// The format of a file's name.
     ///
@@ -90,8 +106,11 @@ impl Format {
         let extension = extension.to_lowercase();
         let found = EXTENSIONS.iter().find(|(known, _)| *known == extension);
         found.map(|(_, format)| *format).ok_or_else(|| {
-            if extension == "mcap" {
-                return NO_MCAP.into();
+            if ELSEWHERE.contains(&extension.as_str()) {
+                return RecordingError(format!(
+                    "{}: this build knows no .{extension}, {LARGER}",
+                    path.display()
+                ));
             }
             let known: Vec<String> = EXTENSIONS.iter().map(|(known, _)| format!(".{known}")).collect();
             let what = if extension.is_empty() {
@@ -217,6 +236,7 @@ fn contents(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Cont
                 None => Contents::Channels(recording.described().settled()?),
             });
         }
+        #[cfg(feature = "mcap")]
         Format::Mcap => {
             return Err("MCAP is written, not read: convert from what it was made of".into());
         }
@@ -224,8 +244,6 @@ fn contents(bytes: Vec<u8>, format: Format, reading: Reading<'_>) -> Result<Cont
         Format::Mat => mat::read(&bytes, reading.time)?,
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::read(bytes, reading.only)?,
-        #[cfg(not(feature = "parquet"))]
-        Format::Parquet => return Err(NO_PARQUET.to_owned().into()),
     };
     Ok(Contents::Channels(with_time(table, reading.time)?))
 }
@@ -244,11 +262,6 @@ pub fn table(columns: Vec<(String, Vec<f64>)>, time: Option<&Term>) -> Result<Re
     };
     with_time(table, time)
 }
-
-const NO_MCAP: &str = "this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap";
-
-#[cfg(not(feature = "parquet"))]
-const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the command line host-sim does";
 
 /// A name with a number behind it, and what else it takes to be no other's.
 fn numbered(name: &str, number: usize, taken: &mut HashSet<String>) -> String {

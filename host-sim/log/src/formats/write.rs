@@ -1,19 +1,20 @@
 //! Files that are written: beside their place, then moved there.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::Path;
 
-#[cfg(not(feature = "mcap"))]
-use super::NO_MCAP;
-#[cfg(not(feature = "parquet"))]
-use super::NO_PARQUET;
+#[cfg(not(feature = "mdf"))]
+use super::LARGER;
 #[cfg(feature = "mcap")]
 use super::mcap;
+#[cfg(feature = "mdf")]
+use super::mdf_write;
 #[cfg(feature = "parquet")]
 use super::parquet;
-use super::{Format, csv, mat, mdf};
+use super::{Format, csv, mat};
 use crate::recording::{Recording, RecordingError, refuse};
+
 /// Writes channels into the file at `path`: beside it first, so that a file that is there is replaced by a whole one.
 ///
 /// # Errors
@@ -24,15 +25,14 @@ pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
         match format {
         Format::Csv => csv::write(&recording.into_one_group()?, out),
         Format::Mat => mat::write(&recording.into_one_group()?, out),
-        Format::Mdf4 => whole(out, mdf::write(&recording)?),
+        #[cfg(feature = "mdf")]
+        Format::Mdf4 => whole(out, mdf_write::write(&recording)?),
+        #[cfg(not(feature = "mdf"))]
+        Format::Mdf4 => Err(format!("this build writes no .mf4, {LARGER}").into()),
         #[cfg(feature = "mcap")]
         Format::Mcap => whole(out, mcap::write(&recording)?),
-        #[cfg(not(feature = "mcap"))]
-        Format::Mcap => Err(NO_MCAP.into()),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::write(&recording.into_one_group()?, out),
-        #[cfg(not(feature = "parquet"))]
-        Format::Parquet => Err(NO_PARQUET.to_owned().into()),
         Format::Candump | Format::Asc | Format::Blf => Err(
             "a table of channels has no frames, and a bus log nothing else; `host-sim run --bus-log` records the bus".into(),
         ),
@@ -50,8 +50,9 @@ pub fn to_csv(recording: Recording) -> Result<Vec<u8>, RecordingError> {
     Ok(text)
 }
 
+#[cfg(any(feature = "mcap", feature = "mdf"))]
 fn whole(out: &mut Out, bytes: Vec<u8>) -> Result<(), RecordingError> {
-    out.write_all(&bytes).map_err(refuse)
+    std::io::Write::write_all(out, &bytes).map_err(refuse)
 }
 
 /// A file under way.

@@ -150,8 +150,8 @@ impl Recording {
     /// The name of a channel, with that of its group where another channel has it too.
     fn name(&self, group: &Group, channel: &Series) -> String {
         match self.channels().filter(|(_, c)| c.name == channel.name).count() {
-            1 => channel.name.clone(),
-            _ => format!("{}.{}", group.name, channel.name),
+            2.. if !group.name.is_empty() => format!("{}.{}", group.name, channel.name),
+            _ => channel.name.clone(),
         }
     }
 

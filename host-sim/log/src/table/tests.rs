@@ -96,3 +96,24 @@ fn a_zero_has_no_sign() {
     let texts = [(-1e-9, 3), (-0.0016, 3), (2.5, 0)].map(|(value, n)| fixed(value, n));
     assert_eq!(texts, ["0.000", "-0.002", "2"]);
 }
+
+#[test]
+fn digits_beyond_all_numbers_are_none() {
+    for (text, value) in [
+        ("1e308", 1e308),
+        ("-1e-400", 0.0),
+        ("inf", f64::INFINITY),
+        ("-inf", f64::NEG_INFINITY),
+    ] {
+        assert_eq!(number(text), Some(value), "{text}");
+    }
+    for text in ["1e400", "-1e309", &"9".repeat(400)] {
+        assert_eq!(number(text), None, "{text}");
+        let (line, column, text) = (3, "a".into(), text.into());
+        let error = TableError::NotANumber { line, column, text }.to_string();
+        assert!(
+            error.ends_with("which is not a number: the largest is 1.8e308"),
+            "{error}"
+        );
+    }
+}

@@ -187,3 +187,25 @@ impl Course {
 fn no_frame<T>(name: &str) -> Result<T, LogError> {
     refuse(format!("no frame of {name} can be used"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A signal every 20 s for hours: its pauses are counted, and no clock was set.
+    #[test]
+    fn a_trace_that_pauses_all_the_time_is_too_slow() {
+        let mut survey = Survey::default();
+        for k in 0..1000_u32 {
+            survey.take(&Value {
+                line: k + 1,
+                time_s: 20.0 * f64::from(k),
+                signal: 0,
+                value: 0.0,
+            });
+        }
+        let error = survey.used(0.0, &[]).unwrap_err().to_string();
+        let says = "the signals pause 999 times, by 20.000 s at most: too slow for an identification";
+        assert!(error.contains(says), "{error}");
+    }
+}

@@ -1,5 +1,7 @@
 //! What freeing a change along one direction adds, for every instant and shape: the sums behind [`super::constancy`].
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::DRIVER;
@@ -55,7 +57,7 @@ struct Sum {
     with: DMatrix<f64>,
 }
 
-/// What freeing a change does.
+/// What freeing a change does. A night has as many of them as seconds: none keeps what grows with the recording.
 #[derive(Clone)]
 pub(super) struct Freed {
     pub(super) by: f64,
@@ -65,8 +67,6 @@ pub(super) struct Freed {
     along: Local,
     /// All that changes: the change and the offset of T_d beside it.
     changes: Local,
-    /// What the parameters take up of a change along each column.
-    taken: DMatrix<f64>,
 }
 
 impl Block {
@@ -84,18 +84,6 @@ impl Block {
 /// The shape whose change is the most evident.
 pub(super) fn most<T>(tried: &[(T, Freed)]) -> Option<&(T, Freed)> {
     tried.iter().max_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
-}
-
-impl Freed {
-    /// What the parameters change by, as vectors: before the change, and after it, from what they are throughout.
-    pub(super) fn sides(&self) -> [DVector<f64>; 2] {
-        let before = -(&self.taken * self.changes);
-        let mut after = before.clone();
-        for i in 0..OFFSET {
-            after[i] += self.changes[i];
-        }
-        [before, after]
-    }
 }
 
 impl Fitted {
@@ -117,9 +105,34 @@ impl Fitted {
         }
     }
 
+    /// The sums where these blocks have all of a change.
+    fn over(&self, changed: Range<usize>) -> Sum {
+        let mut sum = self.nothing();
+        for k in changed {
+            self.add(&mut sum, k, 1.0);
+        }
+        sum
+    }
+
+    /// What the parameters take up of a change along each column.
+    fn taken(&self, sum: &Sum) -> DMatrix<f64> {
+        &self.inverse * &sum.with
+    }
+
+    /// What the parameters change by where these blocks are changed, as vectors: outside of them, and in them, from what they
+    /// are throughout.
+    pub(super) fn sides(&self, freed: &Freed, changed: Range<usize>) -> [DVector<f64>; 2] {
+        let before = -(self.taken(&self.over(changed)) * freed.changes);
+        let mut after = before.clone();
+        for i in 0..OFFSET {
+            after[i] += freed.changes[i];
+        }
+        [before, after]
+    }
+
     /// What freeing the change does beside an offset of T_d, which may change with it unless it is that offset itself.
     fn freed(&self, sum: &Sum, direction: &Local) -> Option<Freed> {
-        let taken = &self.inverse * &sum.with;
+        let taken = self.taken(sum);
         let score = sum.score - Local::from_fn(|i, _| sum.with.column(i).dot(&self.step));
         let products = sum.with.transpose() * &taken;
         let left = sum.square - Square::from_fn(|i, j| products[(i, j)]);
@@ -137,7 +150,6 @@ impl Fitted {
             deviance: by * by * information / self.variance,
             along,
             changes: along * by + beside * score[OFFSET],
-            taken,
         })
     }
 
@@ -188,11 +200,7 @@ impl Fitted {
     }
 
     fn blip(&self, [from, to]: [usize; 2], direction: &Local) -> Option<Freed> {
-        let mut sum = self.nothing();
-        for k in from..to {
-            self.add(&mut sum, k, 1.0);
-        }
-        self.freed(&sum, direction)
+        self.freed(&self.over(from..to), direction)
     }
 
     /// What a test at this `level` of twice the log likelihood, and one for blips at `blip_level`, sees of a change.
@@ -207,10 +215,7 @@ impl Fitted {
             let information = freed?.information / self.variance;
             (information > 0.0).then(|| (level.sqrt() + NINE_OF_TEN) / information.sqrt())
         };
-        let mut half = self.nothing();
-        for k in middle..self.blocks.len() {
-            self.add(&mut half, k, 1.0);
-        }
+        let half = self.over(middle..self.blocks.len());
         let blip = [
             middle,
             (middle + (BLIP_S / BLOCK_S) as usize).min(self.blocks.len()),
@@ -251,7 +256,8 @@ impl Fitted {
     /// The factor by which the scatter of the blocks' scores, less what the change explains, is wider than the prediction errors
     /// say.
     pub(super) fn wider(&self, at: usize, found: &Freed) -> f64 {
-        let [along, changes] = [found.along, found.changes].map(|v| (v, &found.taken * v));
+        let taken = self.taken(&self.over(at..self.blocks.len()));
+        let [along, changes] = [found.along, found.changes].map(|v| (v, &taken * v));
         let regressor =
             |block: &Block, share: f64, (v, taken): &(Local, DVector<f64>)| v * share - block.own(taken);
         let blocks = self.blocks.iter().zip(self.shares([at, at]));
@@ -397,7 +403,7 @@ mod tests {
         };
         let steps = fitted.steps(&unit);
         let (at, freed) = most(&steps).unwrap();
-        let [before, after] = freed.sides().map(|side| side[K_HG]);
+        let [before, after] = fitted.sides(freed, *at..10).map(|side| side[K_HG]);
         let found = [freed.by, freed.deviance, before, after];
         for (found, expected) in found.into_iter().zip([0.4, 0.4, -0.2, 0.2]) {
             assert!((found - expected).abs() < 1e-12, "{found} for {expected}");

@@ -57,9 +57,11 @@ impl Problem<'_> {
             .map(|(name, _, d)| fitted.power(name, d, levels))
             .collect();
         let mut best: Option<(Constancy, [DVector<f64>; 2], f64)> = None;
-        let mut take = |found: Constancy, freed: &Freed, after: f64| {
+        let blocks = fitted.blocks.len();
+        let mut take = |found: Constancy, freed: &Freed, changed: Range<usize>| {
             if best.as_ref().is_none_or(|b| b.0.beyond() < found.beyond()) {
-                best = Some((found, freed.sides(), after));
+                let share = changed.len() as f64 / blocks as f64;
+                best = Some((found, fitted.sides(freed, changed), share));
             }
         };
         for (parameter, enough, direction) in &directions {
@@ -77,8 +79,7 @@ impl Problem<'_> {
                 power: Vec::new(),
                 change: change.flatten(),
             };
-            let after = fitted.shares([*at, *at]).sum::<f64>() / fitted.blocks.len() as f64;
-            take(found, step, after);
+            take(found, step, *at..blocks);
             // A slow remnant looks like an offset that comes and goes.
             let blips = if [T_D, E_Y].contains(parameter) {
                 Vec::new()
@@ -97,7 +98,7 @@ impl Problem<'_> {
                 power: Vec::new(),
                 change: changed.then(|| fitted.change_of_blip(parameter, found)),
             };
-            take(constancy, blip, (to - from) as f64 / fitted.blocks.len() as f64);
+            take(constancy, blip, *from..*to);
         }
         let (mut constancy, sides, after) = best?;
         constancy.power = power;

@@ -2,6 +2,7 @@
 
 mod decode;
 mod signals;
+mod statements;
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -41,14 +42,15 @@ const IS_EXTENDED: u32 = 1 << 31;
 const NO_MESSAGE: &str = "VECTOR__INDEPENDENT_SIG_MSG";
 
 /// Reads a DBC file, in UTF-8 or in the encoding of Windows. Identifiers above 7FF are taken as 29 bits even without their
-/// bit 31.
+/// bit 31. A statement that is not understood is left out, and a signal with it whose value it decides.
 ///
 /// # Errors
-/// What cannot be read.
+/// No message is understood.
 pub fn parse(bytes: &[u8]) -> Result<(Dbc, Notes), RecordingError> {
     let mut notes = Notes::default();
     let text = str::from_utf8(bytes).map(Cow::Borrowed).ok();
     let text = text.or_else(|| can_dbc::decode_cp1252(bytes)).unwrap_or_default();
+    let text = text.trim_start_matches('\u{feff}');
     let (mut whole, mut before, mut named) = (String::with_capacity(text.len()), "", None);
     let mut beyond = HashSet::new();
     for word in text.split_inclusive(char::is_whitespace) {
@@ -79,18 +81,7 @@ pub fn parse(bytes: &[u8]) -> Result<(Dbc, Notes), RecordingError> {
         }
         before = if bare.is_empty() { before } else { bare };
     }
-    let mut dbc = Dbc::try_from(whole.as_str()).map_err(|e| {
-        // Of a drawing of several lines: place and reason.
-        let said = e.to_string();
-        let lines: Vec<&str> = said.lines().map(str::trim).collect();
-        let place = lines.iter().find_map(|line| line.strip_prefix("--> "));
-        let place = place.map(|place| format!("line {}: ", place.replace(':', ", column ")));
-        let reason = lines.last().map_or("", |line| line.trim_start_matches("= "));
-        RecordingError(format!(
-            "the DBC file is not understood: {}{reason}",
-            place.unwrap_or_default()
-        ))
-    })?;
+    let mut dbc = statements::understood(&whole, &mut notes)?;
     let mut known = HashSet::new();
     dbc.messages.retain(|message| {
         let why = match message.id {
@@ -103,9 +94,17 @@ pub fn parse(bytes: &[u8]) -> Result<(Dbc, Notes), RecordingError> {
         }
         false
     });
-    dbc.messages
-        .iter_mut()
-        .for_each(|message| tell_apart(message, &mut notes));
+    for message in &mut dbc.messages {
+        message.signals.retain(|signal| {
+            let is_finite = signal.factor.is_finite() && signal.offset.is_finite();
+            if !is_finite {
+                let why = "its factor or offset is beyond all numbers";
+                notes.channel(Fate::LeftOut, &signal.name, why);
+            }
+            is_finite
+        });
+        tell_apart(message, &mut notes);
+    }
     Ok((dbc, notes))
 }
 
