@@ -30,6 +30,7 @@ pub(crate) enum Drive<'py> {
 #[pyo3(from_item_all)]
 pub(crate) struct How<'py> {
     manual: bool,
+    assisted: bool,
     fix: Vec<String>,
     estimate: Vec<String>,
     between: Vec<[f64; 2]>,
@@ -55,6 +56,7 @@ impl How<'_> {
         let (from, to): (Vec<f64>, Vec<f64>) = self.between.iter().map(|[from, to]| (from, to)).unzip();
         options.between(&from, &to).map_err(refused)?;
         options.bridge_s = within(py, "max_gap", self.max_gap, [0.0, 1.0], "s")?;
+        options.assisted = self.assisted;
         options.leave_out = self.preprocessing;
         options.lane_noise = self.lane_smoothing;
         Ok(options)

@@ -123,6 +123,19 @@ def test_gaps_lanes_and_rows_are_taken_as_asked():
             hg.identify(columns, max_gap=gap)
 
 
+def test_beside_a_power_assist_a_small_torque_is_no_wrong_one():
+    run = probed_run()
+    scale = "driver_torque_nm and guidance_torque_nm have one scale"
+
+    def told(factor, **how):
+        columns = {**run.columns, "driver_torque_nm": factor * run["driver_torque_nm"]}
+        return scale in [r["assumption"] for r in hg.identify(columns, **how).results["refuted"]]
+
+    assert told(0.6) and not told(0.6, assisted=True)
+    # A torque that is recorded too large is told all the same.
+    assert told(1.6) and told(1.6, assisted=True)
+
+
 def test_several_drives_of_one_driver_are_one_fit():
     driver = {"t_p_s": 0.2, "k_d_nm_per_rad": 3.0, "k_hg": 0.4, "remnant_sd_nm": 0.02}
     one, other = (hg.simulate(hg.Scenario(driver=driver, seed=seed, guidance={"probe": True})) for seed in (1, 2))

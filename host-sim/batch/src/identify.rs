@@ -7,10 +7,10 @@ use super::record::default_window;
 use crate::drivers::identified_driver;
 use crate::engine::{Watch, each};
 use crate::error::StudyError;
+use crate::several::{Difference, Population, differences, population};
 use haptic_analysis::identify::{
-    Difference, DriveLog, FixError, Identification, Options, Piece, Pieces, Population, SingleTrack,
-    Tracking, differences, identify_and_track, identify_as_published, identify_in_pieces,
-    identify_together_and_track, identify_with_noise_model, population, track,
+    DriveLog, FixError, Identification, Options, Piece, Pieces, SingleTrack, Tracking, identify_and_track,
+    identify_as_published, identify_in_pieces, identify_together_and_track, identify_with_noise_model, track,
 };
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Scenario};

@@ -9,6 +9,7 @@
 //! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
 //! - [`identify`]: one recorded drive.
 //! - [`vehicle`]: the vehicle of a recorded drive.
+//! - [`several`]: identified drivers beside each other.
 //! - [`run`]: one scenario.
 //! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
@@ -56,6 +57,7 @@ pub mod readings;
 mod record;
 mod recorder;
 pub mod run;
+pub mod several;
 mod sobol;
 pub mod statistics;
 pub mod study;

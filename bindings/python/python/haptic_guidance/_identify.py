@@ -169,6 +169,7 @@ def identify(
     *,
     also: Sequence[Drive] = (),
     manual: bool = False,
+    assisted: bool = False,
     fix: Optional[Mapping[str, float]] = None,
     estimate: Optional[Mapping[str, Optional[tuple[float, float]]]] = None,
     between_s: Sequence[tuple[float, float]] = (),
@@ -197,6 +198,9 @@ def identify(
         More drives of the same driver, of the same rate: all are one fit.
     manual : bool, optional
         A drive without guidance: K_hg is no part of the model.
+    assisted : bool, optional
+        The column has a power assist that is not in ``guidance_torque_nm``: it turns the wheel with the driver, so that no scale of
+        ``driver_torque_nm`` below 1 is refuted.
     fix : mapping of str to float, optional
         Parameters that are known, such as ``{"k_nms": 1.0}``.
     estimate : mapping of str to (float, float) or None, optional
@@ -259,6 +263,7 @@ def identify(
         raise InputError("layout: only for a file; columns are named by map")
     how = dict(
         manual=manual,
+        assisted=assisted,
         fix=fixed,
         estimate=wanted,
         between=[list(stretch) for stretch in between_s],

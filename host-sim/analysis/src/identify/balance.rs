@@ -74,9 +74,12 @@ pub struct Balance {
     /// Steps of the wheel angle's sensor, rad, where most rows bring no other angle; else 0.
     #[serde(skip)]
     pub(crate) angle_step_rad: f64,
-    /// Distance of the rows, s.
+    /// What the part that is not explained could make of the scale at most, if it were all guidance torque.
     #[serde(skip)]
-    pub(crate) row_s: f64,
+    pub(crate) scale_leeway: f64,
+    /// Time that straight lines between rows leave open, s: half of their distance, and all of it where they are uneven.
+    #[serde(skip)]
+    pub(crate) row_leeway_s: f64,
 }
 
 /// A signal and its derivatives through the low-pass.
@@ -279,7 +282,8 @@ fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Opt
             offset_nm: [fit.weights[d - 2], error(d - 2)],
             seconds: rows.len() as f64 * dt,
             angle_step_rad: step_of(&log.wheel_angle_rad, rows),
-            row_s: dt,
+            scale_leeway: if guided { fit.leeway[d + 1] } else { 0.0 },
+            row_leeway_s: if log.resampling.is_empty() { 0.5 * dt } else { dt },
         });
         if driver_late.abs() > 0.3 || guidance_late.abs() > 0.3 || (step.abs() < 5e-4 && more.abs() < 5e-4) {
             break;
@@ -292,6 +296,8 @@ struct Regression {
     weights: DVector<f64>,
     errors: DMatrix<f64>,
     explained: f64,
+    /// What each weight would be off by if all that is left over were that column's own part.
+    leeway: DVector<f64>,
 }
 
 /// Columns over the same rows, each of length one.
@@ -376,5 +382,6 @@ fn regress(y: &[f64], columns: &mut Columns, block: usize) -> Option<Regression>
         weights: DVector::from_fn(m, |i, _| weights[i] / scale[i]),
         errors: DMatrix::from_fn(m, m, |i, j| errors[(i, j)] / (scale[i] * scale[j])),
         explained: if spread > 0.0 { 1.0 - squares / spread } else { 0.0 },
+        leeway: DVector::from_fn(m, |i, _| (squares * inverse[(i, i)]).sqrt() / scale[i]),
     })
 }

@@ -13,7 +13,6 @@ mod balance;
 mod bus_trace;
 mod change;
 mod diagnostics;
-mod drivers;
 mod lane;
 mod log;
 mod motion;
@@ -38,7 +37,6 @@ pub use balance::Balance;
 pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack};
 pub use change::{BLIP_S, Change, Constancy, Power, Shape};
 pub use diagnostics::{autocorrelation, fit_percent};
-pub use drivers::{Difference, Population, differences, holm, population, value_and_error};
 pub use lane::LaneNoise;
 pub use log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 pub use noise_model::{

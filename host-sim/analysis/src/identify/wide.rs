@@ -7,8 +7,6 @@ use multiversion::multiversion;
 
 /// Partial sums: enough to keep an adder busy that takes four cycles.
 const PARTS: usize = 16;
-/// Partial sums where several sums are formed at once.
-const FEW: usize = 8;
 
 /// Rows that are read at once.
 pub(crate) const BLOCK: usize = 64;
@@ -31,37 +29,22 @@ pub(crate) fn window<'a>(u: &'a [f64], from: usize, spare: &'a mut [f64; BLOCK])
 /// Sum of the products of `a` and `b`, over the shorter of the two.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
-    let ((a, rest_a), (b, rest_b)) = (a[..n].as_chunks(), b[..n].as_chunks());
+    let ((a, rest_a), (b, rest_b)) = (a[..n].as_chunks::<PARTS>(), b[..n].as_chunks::<PARTS>());
+    let mut parts = [0.0; PARTS];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..PARTS {
+            parts[i] += a[i] * b[i];
+        }
+    }
     let rest: f64 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
-    products(a, b).iter().sum::<f64>() + rest
+    parts.iter().sum::<f64>() + rest
 }
 
 /// Adds `factor` times `more` to `sum`, over the shorter of the two.
 pub(crate) fn add_times(sum: &mut [f64], factor: f64, more: &[f64]) {
-    let n = sum.len().min(more.len());
-    let ((sum, rest), (more, rest_more)) = (sum[..n].as_chunks_mut(), more[..n].as_chunks());
-    add_products(sum, factor, more);
-    for (s, x) in rest.iter_mut().zip(rest_more) {
+    for (s, x) in sum.iter_mut().zip(more) {
         *s += factor * x;
     }
-}
-
-/// Products of the weighted sum of some columns with each of others, over the shortest of all.
-pub(crate) fn dots_of_sum(weights: &[f64], columns: &[&[f64]], others: &[&[f64]]) -> Vec<f64> {
-    let n = columns.iter().chain(others).map(|c| c.len()).min().unwrap_or(0);
-    let mut sums = vec![[0.0; FEW]; others.len()];
-    products_of_sum(weights, &chunks(columns, n), &chunks(others, n), &mut sums);
-    let rest = (n - n % FEW)..n;
-    let of_rest = |k: usize| weights.iter().zip(columns).map(|(w, c)| w * c[k]).sum::<f64>();
-    let with_rest = |(parts, other): (&[f64; FEW], &&[f64])| {
-        parts.iter().sum::<f64>() + rest.clone().map(|k| of_rest(k) * other[k]).sum::<f64>()
-    };
-    sums.iter().zip(others).map(with_rest).collect()
-}
-
-/// The first `n` values of each column, but for the last few.
-fn chunks<'a>(columns: &[&'a [f64]], n: usize) -> Vec<&'a [[f64; FEW]]> {
-    columns.iter().map(|c| c[..n].as_chunks().0).collect()
 }
 
 /// Adds the products of the columns of a block with each other, in the lower triangle, and with `errors`.
@@ -95,54 +78,6 @@ fn dot_of_block(a: &[f64; BLOCK], b: &[f64; BLOCK]) -> f64 {
     sum
 }
 
-// What is compiled for several processors has plain loops: iterators and closures would stay calls there.
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn products(a: &[[f64; PARTS]], b: &[[f64; PARTS]]) -> [f64; PARTS] {
-    let mut parts = [0.0; PARTS];
-    for k in 0..a.len().min(b.len()) {
-        let (a, b) = (&a[k], &b[k]);
-        for i in 0..PARTS {
-            parts[i] += a[i] * b[i];
-        }
-    }
-    parts
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_products(sum: &mut [[f64; PARTS]], factor: f64, more: &[[f64; PARTS]]) {
-    for k in 0..sum.len().min(more.len()) {
-        let (sum, more) = (&mut sum[k], &more[k]);
-        for i in 0..PARTS {
-            sum[i] += factor * more[i];
-        }
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn products_of_sum(
-    weights: &[f64],
-    columns: &[&[[f64; FEW]]],
-    others: &[&[[f64; FEW]]],
-    sums: &mut [[f64; FEW]],
-) {
-    for k in 0..others.first().map_or(0, |o| o.len()) {
-        let mut weighted = [0.0; FEW];
-        for c in 0..weights.len().min(columns.len()) {
-            let (w, column) = (weights[c], &columns[c][k]);
-            for i in 0..FEW {
-                weighted[i] += w * column[i];
-            }
-        }
-        for o in 0..others.len().min(sums.len()) {
-            let (sum, other) = (&mut sums[o], &others[o][k]);
-            for i in 0..FEW {
-                sum[i] += weighted[i] * other[i];
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,11 +93,6 @@ mod tests {
             let mut sum = ones.clone();
             add_times(&mut sum, 2.0, &counted);
             assert_eq!(sum.iter().sum::<f64>(), f64::from(n * (n + 1) + n + 3));
-            // (2 k + 3) times 1, and times k.
-            let both = dots_of_sum(&[2.0, 3.0], &[&counted, &ones], &[&ones, &counted]);
-            let linear = n * (n + 1) + 3 * n;
-            let square = n * (n + 1) * (2 * n + 1) / 3 + 3 * n * (n + 1) / 2;
-            assert_eq!(both, [f64::from(linear), f64::from(square)]);
         }
     }
 }

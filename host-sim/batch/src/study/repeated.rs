@@ -5,7 +5,7 @@
 //! (1959, Psychometrika 24:95-112) takes of them what is too much. Over the metrics the probabilities are corrected by Holm's method
 //! (1979), so that among conditions that are equal one study in twenty has any metric below 5 %.
 
-use haptic_analysis::identify::holm;
+use crate::several::holm;
 use haptic_metrics::DEFINITIONS;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};

@@ -6,8 +6,8 @@ use std::path::Path;
 use super::place;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Series};
-use haptic_analysis::identify::{Difference, Population, value_and_error};
 use haptic_batch::identify::Drivers;
+use haptic_batch::several::{Difference, Population, value_and_error};
 
 /// Parameters that a torque record can carry.
 const SHOWN: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];

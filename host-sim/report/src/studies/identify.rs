@@ -176,32 +176,28 @@ fn correlogram(found: &Identification) -> Figure {
     Axis::counting("Lag (samples)").figure([panel])
 }
 
-/// Points of a curve of the driver over time, who changes over seconds: more than are seen.
-const MOST_POINTS: usize = 20_000;
-
+/// Each panel is thinned before the next is made: of hours all of them at once would be the largest thing in memory.
 fn followed(drive: &IdentifiedDrive) -> Figure {
     let t = &drive.tracking;
-    let every = t.time_s.len().div_ceil(MOST_POINTS).max(1);
-    let some = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
-    let time_s = some(&t.time_s);
-    let panel = |name: &str, unit: &str, h: &History| {
-        let (estimate, deviation) = (some(&h.estimate), some(&h.standard_deviation));
-        let both = estimate.iter().zip(&deviation);
+    let found = &drive.results.identification;
+    let panel = |(name, unit, h): (&str, &str, &History)| {
+        let both = h.estimate.iter().zip(&h.standard_deviation);
         let ends: Vec<[f64; 2]> = both.map(|(e, s)| [e - 2.0 * s, e + 2.0 * s]).collect();
-        let (x, ends) = broken(&time_s, &ends, [f64::NAN; 2]);
-        Axis::new(name, unit).panel([
+        let (x, ends) = broken(&t.time_s, &ends, [f64::NAN; 2]);
+        let panel = Axis::new(name, unit).panel([
             Series::interval("two standard deviations", 5, &x, &ends),
-            broken_line("estimate", 1, &time_s, &estimate),
-        ])
+            broken_line("estimate", 1, &t.time_s, &h.estimate),
+        ]);
+        over_time(found, [panel]).thinned().panels
     };
     let panels = [
-        panel("K_hg", "-", &t.k_hg),
-        panel("gain_1", "N.m/m", &t.gain[0]),
-        panel("gain_2", "N.m/(m.s)", &t.gain[1]),
-        panel("gain_3", "N.m/rad", &t.gain[2]),
-        panel("t_p", "s", &t.t_p),
+        ("K_hg", "-", &t.k_hg),
+        ("gain_1", "N.m/m", &t.gain[0]),
+        ("gain_2", "N.m/(m.s)", &t.gain[1]),
+        ("gain_3", "N.m/rad", &t.gain[2]),
+        ("t_p", "s", &t.t_p),
     ];
-    over_time(&drive.results.identification, panels)
+    over_time(found, panels.into_iter().flat_map(panel))
 }
 
 /// What is known of the driver, and what it rests on.

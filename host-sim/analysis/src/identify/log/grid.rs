@@ -22,6 +22,9 @@ const LONGEST_STEP: f64 = 3.5;
 /// Stamps that come in pairs, nearly at once, make no grid finer than this share of the usual step.
 const LEAST_STEP: f64 = 0.5;
 
+/// Share of the grid below which what is read off between rows does not count.
+const FEW: f64 = 0.15;
+
 /// Values on the grid that are so many apart share no row.
 const SHARED_LAGS: usize = 8;
 
@@ -131,15 +134,27 @@ impl Grid {
     }
 
     /// Autocorrelation, from lag 1 on, that reading off between rows gives to noise that is white from row to row; empty
-    /// where the rows are taken as they are.
+    /// where nearly all rows are taken as they are.
     pub(super) fn autocorrelation(&self, time: &[f64]) -> Vec<f64> {
-        let Place::Between(longest) = self.place else {
-            return Vec::new();
+        let (longest, is_cubic) = match &self.place {
+            Place::Between(longest) => (*longest, true),
+            // What is lost is bridged by lines.
+            Place::Slots(_) => (LONGEST_STEP * self.dt_s, false),
+            Place::Even => return Vec::new(),
         };
-        let weights: Vec<Weights> = self
+        // Across longer gaps nothing is read off, or the drive is cut.
+        let near = self
             .places(time)
-            .map(|(k, t)| Weights::between(time, k, t, longest, |_| true))
+            .filter(|(k, _)| time[k + 1] - time[*k] <= longest);
+        let weights: Vec<Weights> = near
+            .map(|(k, t)| Weights::between(time, k, t, longest, |_| is_cubic))
             .collect();
+        let read_off = weights
+            .iter()
+            .filter(|w| w.weight.iter().all(|w| *w < 1.0 - TIME_STAMP_TOLERANCE));
+        if (read_off.count() as f64) < FEW * weights.len() as f64 {
+            return Vec::new();
+        }
         let at = |lag: usize| -> f64 {
             weights
                 .iter()

@@ -225,6 +225,12 @@ impl DriveLog {
         self.every_so_many_th().begun()
     }
 
+    /// By how much more variance a slow sum of the prediction errors has than if they were white, at most: reading off between rows
+    /// makes neighbours alike, and the noise model may take up a part of that.
+    pub(crate) fn slow_noise(&self) -> f64 {
+        1.0 + 2.0 * self.resampling.iter().map(|r| r.max(0.0)).sum::<f64>()
+    }
+
     fn every_so_many_th(mut self) -> Self {
         let rate_hz = 1.0 / self.dt_s;
         let every = self

@@ -20,7 +20,7 @@ use nalgebra::{DMatrix, DVector};
 use super::change_score::{BLOCK_S, Block, Fitted, Freed, LOCAL, Local, OFFSET, most};
 use super::delays::Line;
 use super::sums::Rows;
-use super::{K_HG, OWN_OFFSET, Problem, T_P};
+use super::{K_HG, LONGEST_DELAY_S, OWN_OFFSET, Problem, T_P};
 use crate::identify::balance::{Balance, balance};
 use crate::identify::change::{Change, Constancy, E_Y, T_D};
 use crate::identify::result::Refutation;
@@ -31,15 +31,34 @@ use crate::identify::verdict;
 /// are then declared changed.
 const LEVEL: f64 = 16.0;
 /// The level of a change that goes back: it has a length besides, and more of them are tried.
-const BLIP_LEVEL: f64 = 21.0;
+const BLIP_LEVEL: f64 = 24.0;
 /// Above this value a change is not declared yet, but widens the errors of the estimates.
 const DOUBT: f64 = 10.0;
+/// What a changed delay may lie beyond its bounds, s.
+const DELAY_SLACK_S: f64 = 0.05;
+
+/// Counts of changes of a delay only what delays can do: the likelihood is a parabola about one optimum, and its top may lie where no
+/// delay is.
+fn hold_possible<T>(t_p_s: f64, tried: &mut [(T, Freed)]) {
+    let room_s = |by: f64| DELAY_SLACK_S + if by > 0.0 { LONGEST_DELAY_S - t_p_s } else { t_p_s };
+    for (_, freed) in tried {
+        let share = |side: DVector<f64>| (room_s(side[T_P]) / side[T_P].abs()).min(1.0);
+        let share = freed.sides().map(share).into_iter().fold(1.0, f64::min);
+        freed.deviance *= share * (2.0 - share);
+    }
+}
 
 impl Problem<'_> {
     /// Whether the driver was the same throughout; `None` if there is nothing to estimate. A change that is likely
     /// but not certain widens `errors` by the mean squared distance of the changed driver from the estimate over the
     /// recording.
-    pub(super) fn constancy(&self, p: &[f64], variance: f64, errors: &mut DMatrix<f64>) -> Option<Constancy> {
+    pub(super) fn constancy(
+        &self,
+        p: &[f64],
+        variance: f64,
+        manual: bool,
+        errors: &mut DMatrix<f64>,
+    ) -> Option<Constancy> {
         // By torques: where a line moves, gain_2 is lost, and a line by its size with it.
         let fitted = self.fitted(&self.kept_rows(p, Line::Torques), variance);
         let unit = |i: usize| Local::from_fn(|j, _| f64::from(i == j && (i > T_P || self.is_free(i))));
@@ -65,7 +84,10 @@ impl Problem<'_> {
             }
         };
         for (parameter, enough, direction) in &directions {
-            let steps = fitted.steps(direction);
+            let mut steps = fitted.steps(direction);
+            if *parameter == "t_p" {
+                hold_possible(p[T_P], &mut steps);
+            }
             let Some((at, step)) = most(&steps) else {
                 continue;
             };
@@ -73,19 +95,26 @@ impl Problem<'_> {
             let deviance = step.deviance / wider;
             let changed = deviance > LEVEL && step.by.abs() > *enough;
             let change = changed.then(|| fitted.change(parameter, direction, &steps, wider));
+            let change = change.flatten();
+            if change.as_ref().is_some_and(|c| self.is_no_sensor(c, manual)) {
+                continue;
+            }
             let found = Constancy {
                 deviance,
                 level: LEVEL,
                 power: Vec::new(),
-                change: change.flatten(),
+                change,
             };
             take(found, step, *at..blocks);
             // A slow remnant looks like an offset that comes and goes.
-            let blips = if [T_D, E_Y].contains(parameter) {
+            let mut blips = if [T_D, E_Y].contains(parameter) {
                 Vec::new()
             } else {
                 fitted.blips(direction)
             };
+            if *parameter == "t_p" {
+                hold_possible(p[T_P], &mut blips);
+            }
             let Some(found @ ([from, to], blip)) = most(&blips) else {
                 continue;
             };
@@ -126,7 +155,9 @@ impl Problem<'_> {
     /// torque a driver makes turns the wheel; where it cannot be weighed, nothing does, and it is a line.
     pub(super) fn torque_moves(&self, p: &[f64], variance: f64, manual: bool) -> bool {
         let mut unused = DMatrix::zeros(self.size(), self.size());
-        let change = self.constancy(p, variance, &mut unused).and_then(|c| c.change);
+        let change = self
+            .constancy(p, variance, manual, &mut unused)
+            .and_then(|c| c.change);
         let Some(change) = change.filter(|c| c.parameter == T_D) else {
             return false;
         };
@@ -137,6 +168,21 @@ impl Problem<'_> {
             let moved = is - was;
             moved * change.by > 0.0 && moved.abs() > verdict::CERTAIN * error.hypot(error_was)
         })
+    }
+
+    /// Whether the balance of the column's torques denies that the torque sensor's offset changed: what the torque on the wheel did, a
+    /// driver did.
+    fn is_no_sensor(&self, change: &Change, manual: bool) -> bool {
+        let Some(sides) = Some(change)
+            .filter(|c| c.parameter == T_D)
+            .and_then(|c| self.balances(c, manual))
+        else {
+            return false;
+        };
+        let is_weighed = sides.iter().all(|b| b.explained >= verdict::BALANCE_CLOSE);
+        let [[was, error_was], [is, error]] = sides.map(|b| b.offset_nm);
+        let (moved, said) = ((is - was) * change.by.signum(), change.by.abs());
+        is_weighed && moved < 0.5 * said && said - moved > verdict::CERTAIN * error.hypot(error_was)
     }
 
     /// The balances of the column's torques before and after the middle of a change.
@@ -206,6 +252,53 @@ impl Problem<'_> {
             step: &inverse * score,
             inverse,
             variance,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Forty blocks of information 1 each on t_p, fitted as constant at 0.1 s, of which either side lies off by half of `by`. Of 0.2 s all
+    /// counts; of 0.4 s the lower side would lie at -0.1 s, of which -0.05 s are left to it: three quarters, and so 1 - (1/4)^2 of the
+    /// deviance, whichever side comes first.
+    #[test]
+    fn a_delay_changes_by_what_a_delay_can() {
+        let unit = Local::from_fn(|j, _| f64::from(j == T_P));
+        let deviances = |by: f64| {
+            let half = |k: usize| if k < 20 { -0.5 * by } else { 0.5 * by };
+            let block = |k: usize| Block {
+                stretch: 0,
+                from_s: k as f64,
+                to_s: k as f64 + 1.0,
+                score: unit * half(k),
+                gram: unit * unit.transpose(),
+            };
+            let mut inverse = DMatrix::zeros(LOCAL, LOCAL);
+            inverse[(T_P, T_P)] = 1.0 / 40.0;
+            let fitted = Fitted {
+                blocks: (0..40).map(block).collect(),
+                inverse,
+                step: DVector::zeros(LOCAL),
+                variance: 1.0,
+            };
+            let mut steps = fitted.steps(&unit);
+            let before = most(&steps).unwrap().1.deviance;
+            hold_possible(0.1, &mut steps);
+            [before, steps.iter().find(|s| s.0 == 20).unwrap().1.deviance]
+        };
+        for sign in [1.0, -1.0] {
+            let [before, held] = deviances(0.2 * sign);
+            assert!(
+                (before - 0.4).abs() < 1e-9 && (held - 0.4).abs() < 1e-9,
+                "{before} {held}"
+            );
+            let [before, held] = deviances(0.4 * sign);
+            assert!(
+                (before - 1.6).abs() < 1e-9 && (held - 1.5).abs() < 1e-9,
+                "{before} {held}"
+            );
         }
     }
 }

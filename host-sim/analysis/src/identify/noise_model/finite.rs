@@ -22,7 +22,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::sums::Rows;
 use super::{CORE, K_HG, OWN_BEND, OWN_OFFSET, Problem, RHO, T_P};
-use crate::identify::wide::{add_times, dot, dots_of_sum};
+use crate::identify::wide::{add_times, dot};
 
 /// Rows are averaged over so long, s.
 const BLOCK_S: f64 = 0.1;
@@ -119,11 +119,12 @@ fn mean_miss(mut stretches: Vec<Blocks>, root: &DMatrix<f64>, rows: usize, lags:
         miss -= &answer * (rows * trace / pairs.max(1.0));
         // C_k' times the answer, without C_k: each row's product with the answer, and that with the later rows.
         for s in long_enough() {
-            let now: Vec<&[f64]> = s.regressors.iter().map(|x| &x[..x.len() - lag]).collect();
-            let later: Vec<&[f64]> = s.regressors.iter().map(|x| &x[lag..]).collect();
-            let through = dots_of_sum(answer.as_slice(), &now, &later);
-            for (miss, t) in miss.iter_mut().zip(&through) {
-                *miss -= rows * rows * t / pairs.max(1.0);
+            let mut through = vec![0.0; s.errors.len() - lag];
+            for (a, x) in answer.iter().zip(&s.regressors) {
+                add_times(&mut through, *a, x);
+            }
+            for (miss, x) in miss.iter_mut().zip(&s.regressors) {
+                *miss -= rows * rows * dot(&through, &x[lag..]) / pairs.max(1.0);
             }
         }
     }

@@ -10,7 +10,7 @@ use super::sums::Rows;
 use super::uncertainty::Doubts;
 use super::{
     Assumed, COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem, SMALLEST_ERROR_NM,
-    T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS,
+    START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS,
 };
 use crate::identify::balance::Balance;
 use crate::identify::change::{BLIP_S, Change, Power};
@@ -32,13 +32,23 @@ const MATTERS: f64 = 0.3;
 const DRAWN: f64 = 3.0;
 /// Standard errors from 0 below which a gain_2 may be hidden by a line.
 const HIDDEN: f64 = 2.0;
-/// Twice the log likelihood ratio that the driver model has to gain over no driver at all.
+/// Twice the log likelihood ratio that the driver model has to gain over no driver at all, and how many times as much a usual driver
+/// would gain in a record that tells whether there is one.
 const LEAST_GAIN: f64 = 60.0;
+const TELLING: f64 = 2.0;
 /// Guidance beyond this, N.m, is no offset of a sensor.
 const GUIDED_NM: f64 = 0.03;
 /// Rows that are further apart do not tell the driver's muscle, whose lag is 0.1 s: at 10 Hz K_hg's optimum is off by three times as
 /// much as at 20 Hz (`cargo xtask validate --recordings`).
 const SLOWEST_S: f64 = 0.055;
+
+/// What a driver model that gains little says.
+enum Beside {
+    /// Nobody steers.
+    Nothing(Refutation),
+    /// A usual driver would gain as little.
+    TooShort,
+}
 
 /// Where the profile of the delay passes the 95 % level for the first and the last time, or ends below it. Between its points
 /// its root is taken as straight, as it is of a parabola.
@@ -129,6 +139,10 @@ impl Problem<'_> {
         // Where a sensor is wrong, all that follows from it looks like another driver too.
         let change = change.filter(|_| refuted.is_empty());
         let mut others = self.other_evidence(found, optimum, doubts);
+        let nothing = self.beside_nothing(optimum);
+        if let Some(Beside::Nothing(refutation)) = &nothing {
+            others.push((f64::INFINITY, refutation.clone()));
+        }
         // What the change explains better is no cause of its own, and a change is none where something else explains more: a fit
         // with the cure of the first is judged again.
         let change = change.filter(|c| sensor.is_some() || others.iter().all(|o| o.0 <= c.deviance));
@@ -151,6 +165,13 @@ impl Problem<'_> {
         let p = &optimum.point;
         found.assumed = verdict::ASSUMED.iter().map(|&a| a.to_owned()).collect();
         found.assumed.extend(self.withhold(&mut found.parameters));
+        if matches!(nothing, Some(Beside::TooShort)) {
+            found.parameters.disown();
+            found.notes.push(
+                "The record is too short, or the disturbance too large, to tell whether anybody steers: nothing is called identified."
+                    .to_owned(),
+            );
+        }
         found
             .notes
             .extend(self.hidden_gain_2(&mut found.parameters.gain_2));
@@ -187,7 +208,6 @@ impl Problem<'_> {
                 self.bridged_share(found),
             ],
         );
-        others.extend(self.beside_nothing(optimum).map(|r| (f64::INFINITY, r)));
         others.extend(self.of_bounds(doubts));
         others.extend(verdict::of_gain_3(&found.parameters.gain_3));
         others.extend(self.of_muscle(found, &optimum.point, doubts.alternatives, doubts.errors));
@@ -351,7 +371,7 @@ impl Problem<'_> {
             .collect();
         let variance = self.error_variance(optimum);
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
-        let all = self.alternatives(p, &free, variance);
+        let all = self.alternatives(p, &free, variance * self.log.slow_noise());
         all.into_iter()
             .filter(|a| [K_NMS, T_NMS].contains(&a.place))
             .filter(|a| self.assumed.iter().any(|known| known.place == a.place))
@@ -416,8 +436,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Whether the driver model predicts the torque better than a disturbance without any driver would.
-    fn beside_nothing(&self, optimum: &Optimum) -> Option<Refutation> {
+    /// A driver model that predicts the torque no better than a disturbance without any driver would.
+    fn beside_nothing(&self, optimum: &Optimum) -> Option<Beside> {
         if (0..=T_P).all(|i| !self.is_free(i)) {
             return None;
         }
@@ -432,7 +452,12 @@ impl Problem<'_> {
         let variance = 2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64;
         let gain =
             2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));
-        (gain < LEAST_GAIN).then(|| Refutation {
+        let free: Vec<usize> = (0..self.size()).filter(|&i| self.is_free(i)).collect();
+        let error = covariance(&optimum.quadratic.hessian, &free)[(2, 2)] * variance;
+        if gain < LEAST_GAIN && self.is_free(2) && START[2].powi(2) < TELLING * LEAST_GAIN * error {
+            return Some(Beside::TooShort);
+        }
+        let refutation = || Refutation {
             assumption: "driver_torque_nm is a driver's answer to the inputs",
             evidence: format!(
                 "the driver model predicts it no better than a disturbance alone (log likelihood ratio {:.1})",
@@ -440,7 +465,8 @@ impl Problem<'_> {
             ),
             cause: "driver_torque_nm is noise, of another drive, or of nobody's hands".to_owned(),
             cure: "check the sensor and the column of the log".to_owned(),
-        })
+        };
+        (gain < LEAST_GAIN).then(|| Beside::Nothing(refutation()))
     }
 }
 

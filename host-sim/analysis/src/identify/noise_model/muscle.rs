@@ -10,6 +10,9 @@ use crate::identify::verdict;
 
 /// By so much t_nms may be outside of the range of arms all the same, s: the range is of rounded figures.
 const ROUNDING_S: f64 = 0.002;
+/// A standard error of t_nms, s, up to which the record tells it whatever is assumed, and how many of larger ones count.
+const TOLD_S: f64 = 0.01;
+const SURELY: f64 = 3.0;
 /// What an arm that is none counts at least, in twice the log likelihood.
 const REFUTES: f64 = 25.0;
 
@@ -56,7 +59,9 @@ impl Problem<'_> {
             ));
             let [low, high] = T_NMS_RANGE_S;
             let beyond = (low - drawn).max(drawn - high);
-            if a.place == T_NMS && beyond > ROUNDING_S.max(error) {
+            // One that the record does not tell well is held by what is assumed, and must be surely beyond.
+            let sure = if error < TOLD_S { error } else { SURELY * error };
+            if a.place == T_NMS && beyond > ROUNDING_S.max(sure) {
                 let refutation = Refutation {
                     assumption: "t_nms is that of an arm",
                     evidence: format!(

@@ -47,7 +47,7 @@ impl Problem<'_> {
         starts: Vec<Start>,
     ) -> Identification {
         let (log, p) = (&prepared.log, &optimum.point);
-        let (found, kept) = self.uncertainty(prepared, optimum);
+        let (found, kept) = self.uncertainty(prepared, options.manual, optimum);
         let Named {
             parameters,
             beyond,

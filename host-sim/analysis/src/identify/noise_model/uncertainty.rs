@@ -69,7 +69,12 @@ pub(super) struct ActiveBounds {
 
 impl Problem<'_> {
     /// The errors of an optimum, and its rows.
-    pub(super) fn uncertainty(&self, prepared: &Prepared, optimum: &Optimum) -> (Uncertainty, Rows) {
+    pub(super) fn uncertainty(
+        &self,
+        prepared: &Prepared,
+        manual: bool,
+        optimum: &Optimum,
+    ) -> (Uncertainty, Rows) {
         let p = &optimum.point;
         // A disturbance on its bound (no sensor noise, say) is taken as known: only the driver's own bounds may
         // have held the estimate back.
@@ -105,11 +110,12 @@ impl Problem<'_> {
             .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
             .collect();
         let doubted = self.doubted(&prepared.lane_doubts, p, &kept, &inverse);
-        let mut alternatives = self.alternatives(p, &core, error_variance);
+        let slow_variance = error_variance * self.log.slow_noise();
+        let mut alternatives = self.alternatives(p, &core, slow_variance);
         let drawn_with = alternatives
             .iter_mut()
             .find(|a| a.place == T_NMS)
-            .map(|a| doubted.widen(a, error_variance));
+            .map(|a| doubted.widen(a, slow_variance));
         // What else may be estimated (the muscle, delays of sensors, the share of white noise) counts as known there.
         let within: Vec<usize> = core
             .iter()
@@ -120,7 +126,7 @@ impl Problem<'_> {
         let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian, &kept);
         let active = self.active_bounds(optimum, &free, &errors, error_variance);
         errors += doubted.covariance(self.size());
-        let constancy = self.constancy(p, error_variance, &mut errors);
+        let constancy = self.constancy(p, error_variance, manual, &mut errors);
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
         if self.assumed.iter().any(|a| !self.is_free(a.place)) {
             at_t_nms = Some(self.as_assumed(&unbiased, &errors, &active.pull));

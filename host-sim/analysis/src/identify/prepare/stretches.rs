@@ -53,8 +53,14 @@ pub struct LeftOut {
 const HANDS_OFF_NM: f64 = 0.032;
 const HANDS_OFF_OFFSET_NM: f64 = 0.1;
 const HANDS_OFF_S: f64 = 2.0;
-/// Half the stretch that a sensor's noise is averaged over before that, s: hands move more slowly.
-const HANDS_NOISE_S: f64 = 0.05;
+/// Half the stretch that a sensor's noise is averaged over before that, s: hands move more slowly. Where the noise would fill the band even so,
+/// it is averaged over up to ten times as much, and the torque must be noise alone: it scatters by no more than so many times the noise.
+const HANDS_NOISE_S: [f64; 2] = [0.05, 0.5];
+const HANDS_SCATTER: f64 = 1.25;
+/// In rows that are farther apart, s, a driver looks like noise too.
+const HANDS_ROW_S: f64 = 0.02;
+/// A mean of noise stays within so many of its standard deviations for some seconds.
+const NOISE_BAND: f64 = 8.0;
 /// ... if the far point and the guidance would have asked this of any driver meanwhile, N.m.
 const ASKED_NM: f64 = 0.05;
 /// A driver whose torque usually moves by so many of those bands in [`HANDS_OFF_S`] is never quiet for twice as long.
@@ -216,6 +222,25 @@ fn averaged(signal: &[f64], half: usize) -> Vec<f64> {
     (0..signal.len()).map(mean).collect()
 }
 
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Standard deviation of a signal's noise: of three rows the middle one lies beside the mean of the others, in the median.
+fn noise_of(signal: &[f64]) -> f64 {
+    let beside: Vec<f64> = signal
+        .windows(3)
+        .map(|w| (w[1] - 0.5 * (w[0] + w[2])).abs())
+        .collect();
+    // Two thirds of the variance of such a difference are the middle row's; 1.4826 makes a standard deviation of a median.
+    if beside.is_empty() {
+        0.0
+    } else {
+        1.4826 * (2.0_f64 / 3.0).sqrt() * median(beside)
+    }
+}
+
 /// Hands are off where the torque is quiet near zero although there was something to steer, or for long in a drive whose
 /// driver is not that quiet.
 fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
@@ -228,17 +253,29 @@ fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
     let restless = usual
         .get(usual.len() / 2)
         .is_some_and(|&u| u > RESTLESS * HANDS_OFF_NM);
-    let half = (HANDS_NOISE_S / log.dt_s) as usize;
-    let mut still = quiet(&averaged(&log.driver_torque_nm, half), HANDS_OFF_NM, rows);
-    let mut torques = log.driver_torque_nm.clone();
-    let middle = torques.len() / 2;
-    let offset = *torques.select_nth_unstable_by(middle, f64::total_cmp).1;
-    for (still, torque) in still.iter_mut().zip(&log.driver_torque_nm) {
-        *still &= torque.abs().min((torque - offset).abs()) <= HANDS_OFF_OFFSET_NM;
+    let torque = &log.driver_torque_nm;
+    let noise_nm = noise_of(torque);
+    let [least, most] = HANDS_NOISE_S.map(|s| (s / log.dt_s) as usize);
+    let needed = (0.5 * (NOISE_BAND * noise_nm / HANDS_OFF_NM).powi(2)) as usize;
+    let half = if log.dt_s > HANDS_ROW_S {
+        least
+    } else {
+        needed.clamp(least, most)
+    };
+    let mean = averaged(torque, half);
+    let mut still = quiet(&mean, HANDS_OFF_NM, rows);
+    let offset = median(torque.clone());
+    for (still, mean) in still.iter_mut().zip(&mean) {
+        *still &= mean.abs().min((mean - offset).abs()) <= HANDS_OFF_OFFSET_NM;
     }
+    let is_noise = |run: &Range<usize>| {
+        let (torque, mean) = (&torque[run.clone()], &mean[run.clone()]);
+        let scatter: f64 = torque.iter().zip(mean).map(|(t, m)| (t - m).powi(2)).sum();
+        half == least || (scatter / run.len() as f64).sqrt() <= HANDS_SCATTER * noise_nm
+    };
     true_runs(&still)
         .into_iter()
-        .filter(|r| r.len() >= rows)
+        .filter(|r| r.len() >= rows && is_noise(r))
         // At their ends the mean is half of hands.
         .map(|r| r.start.saturating_sub(half)..(r.end + half).min(log.len()))
         .filter(|r| {
@@ -254,4 +291,42 @@ fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
             (asked / r.len() as f64).sqrt() > ASKED_NM || (restless && r.len() >= 2 * rows)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A driver who swings by 0.3 N.m at 0.4 Hz, but for 20 s in the middle, under a sensor's noise of 0.03 N.m: those 20 s are left out, to
+    /// half a second at either end, and nothing of a driver who holds on with a quarter of that and the noise.
+    #[test]
+    fn hands_are_off_below_a_sensors_noise_too() {
+        let mut state: u64 = 5;
+        let mut noise = move || -> f64 {
+            let uniform = |_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            0.03 * ((0..12).map(uniform).sum::<f64>() - 6.0)
+        };
+        let mut log = |held: f64| {
+            let swing = |k: usize| 0.3 * (0.8 * std::f64::consts::PI * k as f64 / 100.0).sin();
+            let is_middle = |k: usize| (4000..6000).contains(&k);
+            let torque = (0..10_000).map(|k| swing(k) * if is_middle(k) { held } else { 1.0 } + noise());
+            DriveLog {
+                dt_s: 0.01,
+                driver_torque_nm: torque.collect(),
+                e_y_m: vec![0.5; 10_000],
+                e_theta_rad: vec![0.0; 10_000],
+                wheel_angle_rad: vec![0.0; 10_000],
+                ..DriveLog::default()
+            }
+        };
+        let off = hands_off(&log(0.0), 200);
+        let [from, to] = [off[0].start, off[off.len() - 1].end];
+        assert!(from.abs_diff(4000) < 60 && to.abs_diff(6000) < 60, "{off:?}");
+        let off_rows: usize = off.iter().map(Range::len).sum();
+        assert!(off_rows > 1800, "{off:?}");
+        assert_eq!(hands_off(&log(0.25), 200), []);
+    }
 }

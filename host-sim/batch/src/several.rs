@@ -14,7 +14,10 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use statrs::function::erf::erfc;
 
-use super::result::{Identification, Parameter, STANDARD_NORMAL_95};
+use haptic_analysis::identify::{Identification, Parameter};
+
+/// Standard deviations that 95 % lie within.
+const NORMAL_95: f64 = 1.959_964;
 
 /// One parameter of two drivers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -43,7 +46,7 @@ pub fn differences(first: &Identification, second: &Identification) -> Vec<Diffe
         .filter_map(|((parameter, unit, a), (_, _, b))| {
             let ((a, a_error), (b, b_error)) = (value_and_error(a)?, value_and_error(b)?);
             let (difference, standard_error) = (a - b, a_error.hypot(b_error));
-            let margin = STANDARD_NORMAL_95 * standard_error;
+            let margin = NORMAL_95 * standard_error;
             Some(Difference {
                 parameter,
                 unit,
