@@ -78,6 +78,7 @@ const SIDE_BY_SIDE: [&str; 3] = [
 const PACKAGES: Arrows = &[
     ("core", &[]),
     ("core/diag", &["haptic-core"]),
+    ("core/observer", &["haptic-core"]),
     ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
