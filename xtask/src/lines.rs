@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 25] = [
+pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -25,6 +25,7 @@ pub(crate) const BUDGETS: [(&str, usize); 25] = [
     ("host-sim/analysis", 9_200),
     ("host-sim/batch", 9_000),
     ("host-sim/campaign", 4_000),
+    ("host-sim/column", 1_400),
     ("host-sim/evidence", 6_900),
     ("host-sim/log", 5_700),
     ("host-sim/metrics", 600),
