@@ -18,7 +18,7 @@
 //! # Formats, errors and costs
 //!
 //! Angle I32F32 rad, rate I0F32 rad/ms, torque I8F24 N.m. Beside the same equations in f64 the estimate is off by at most 6 mN.m
-//! (`tests/oracle.rs`), for bandwidths of 10 to 300 rad/s. A step has 6 products of 32 bits, no division and no loop.
+//! (`tests/oracle.rs`), for bandwidths of 10 to 300 rad/s. A step has 9 products of 32 bits, no division and no loop.
 //!
 //! Not here: who asks for the estimate. The ECU does not use it yet; how good it is with which sensor prints `host-sim driver-torque`.
 
@@ -94,6 +94,8 @@ pub struct State {
     beside: I8F24,
     /// T_tb of the last step, N.m.
     bar: I8F24,
+    /// How far the wheel's friction has given, as a share of all that it can: -1 to 1.
+    given: I8F24,
 }
 
 /// The observer; its memory is apart.
@@ -156,18 +158,20 @@ impl Observer {
     /// Before the first sample nothing is known but the bar; from it on the wheel rests.
     fn begin(&self, state: &mut State, sampled: Option<I32F32>, bar: I8F24) -> Limit {
         state.angle = sampled;
-        state.rate = I0F32::ZERO;
+        (state.rate, state.given) = (I0F32::ZERO, I8F24::ZERO);
         state.beside = bar;
         Limit::None
     }
 
-    /// Friction and damping of the wheel, N.m.
-    fn resists(&self, rate: I0F32) -> I8F24 {
-        let damping = I8F24::saturating_from_num(rate.wide_mul(self.setup.damping));
-        let share = I8F24::saturating_from_num(rate.wide_mul(self.setup.slides));
-        // Dry friction is fully there once the wheel slides.
-        let share = share.min(I8F24::ONE).max(I8F24::NEG_ONE);
-        let friction = I8F24::saturating_from_num(share.wide_mul(self.setup.friction));
+    /// Damping and friction of the wheel, N.m; friction after Dahl, by how far the wheel has given.
+    fn resists(&self, state: &mut State) -> I8F24 {
+        let damping = I8F24::saturating_from_num(state.rate.wide_mul(self.setup.damping));
+        // A wheel that turns by all that it can give has slid: more is no more.
+        let turned = I8F24::saturating_from_num(state.rate.wide_mul(self.setup.gives));
+        let turned = turned.min(I8F24::ONE).max(I8F24::NEG_ONE);
+        let back = I8F24::saturating_from_num(turned.saturating_abs().wide_mul(state.given));
+        state.given = state.given.saturating_add(turned).saturating_sub(back);
+        let friction = I8F24::saturating_from_num(state.given.wide_mul(self.setup.friction));
         damping.saturating_add(friction)
     }
 
@@ -207,7 +211,7 @@ impl Observer {
         let most = self.setup.most;
         let within = |torque: I8F24| torque.min(most).max(most.saturating_neg());
         let rate = state.rate.min(MOST_RATE).max(MOST_RATE.saturating_neg());
-        let asked = state.beside.saturating_add(self.resists(rate));
+        let asked = state.beside.saturating_add(self.resists(state));
         let hands = within(asked);
         let limit = match before {
             Limit::None if hands != asked || within(state.beside) != state.beside => Limit::Torque,

@@ -30,6 +30,8 @@ pub struct Parameters {
     pub b_w: f64,
     /// Dry friction of the wheel, N.m: 0 to 5.
     pub friction_nm: f64,
+    /// How far the wheel gives before it slides, rad: 0.0005 to 0.1.
+    pub friction_give_rad: f64,
     /// K_tb, N.m/rad: 5 to 1000.
     pub k_tb: f64,
     /// Where the angle is measured.
@@ -48,6 +50,7 @@ impl Default for Parameters {
             j_w: 0.044,
             b_w: 0.05,
             friction_nm: 0.2,
+            friction_give_rad: 0.0035,
             k_tb: 143.24,
             angle_at: AngleAt::Column,
             sample_ms: 1.0,
@@ -85,8 +88,8 @@ pub struct Setup {
     pub(crate) by_torque: I0F32,
     /// Damping, N.m per rad/ms.
     pub(crate) damping: I16F16,
-    /// How much of the friction is there for a rate, per rad/ms: all of it from 0.05 rad/s on.
-    pub(crate) slides: I16F16,
+    /// One over what the friction gives, 1/rad.
+    pub(crate) gives: I16F16,
     /// Friction of a wheel that slides, N.m.
     pub(crate) friction: I8F24,
     /// What an error of the angle does to angle, rate (1/ms) and torque (N.m/rad).
@@ -97,9 +100,6 @@ pub struct Setup {
     pub(crate) most: I8F24,
     lag_us: u32,
 }
-
-/// Rate from which on a wheel's friction is all there, rad/s.
-pub(crate) const SLIDES_FROM: f64 = 0.05;
 
 /// e^-x for 0 to 1, by its series: the error is below 1e-12. `core` has no exponential.
 const fn decay(x: f64) -> f64 {
@@ -129,6 +129,7 @@ impl Setup {
             ("j_w", of.j_w, [0.005, 0.5]),
             ("b_w", of.b_w, [0.0, 5.0]),
             ("friction_nm", of.friction_nm, [0.0, 5.0]),
+            ("friction_give_rad", of.friction_give_rad, [0.0005, 0.1]),
             ("k_tb", of.k_tb, [5.0, 1000.0]),
             ("sample_ms", of.sample_ms, [1.0, 20.0]),
             ("bandwidth", of.bandwidth, [5.0, most]),
@@ -154,7 +155,7 @@ impl Setup {
             twist: I0F32::from_bits(scaled(1.0 / of.k_tb, 32)),
             by_torque: I0F32::from_bits(scaled(1e-6 / of.j_w, 32)),
             damping: I16F16::from_bits(scaled(of.b_w * 1000.0, 16)),
-            slides: I16F16::from_bits(scaled(1000.0 / SLIDES_FROM, 16)),
+            gives: I16F16::from_bits(scaled(1.0 / of.friction_give_rad, 16)),
             friction: I8F24::from_bits(scaled(of.friction_nm, 24)),
             to_angle: ToAngle::from_bits(scaled(1.0 - pole * pole * pole, 30)),
             to_rate: I8F24::from_bits(scaled(1.5 * left * left * (1.0 + pole) / of.sample_ms, 24)),

@@ -13,6 +13,7 @@ struct Oracle {
     rate: f64,
     beside: f64,
     bar: f64,
+    given: f64,
 }
 
 impl Oracle {
@@ -37,7 +38,10 @@ impl Oracle {
         } else {
             (self.angle, self.beside) = (sampled, bar_nm);
         }
-        self.beside + of.b_w * self.rate + of.friction_nm * (self.rate / 0.05).clamp(-1.0, 1.0)
+        // Dahl: z' = w - |w| z/give.
+        let turned = (1e-3 * self.rate / of.friction_give_rad).clamp(-1.0, 1.0);
+        self.given += turned - turned.abs() * self.given;
+        self.beside + of.b_w * self.rate + of.friction_nm * self.given
     }
 }
 
