@@ -83,7 +83,7 @@ const PACKAGES: Arrows = &[
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
-    ("host-sim/column", &["haptic-sim"]),
+    ("host-sim/column", &["haptic-core", "haptic-observer", "haptic-sim"]),
     ("host-sim/vectorised", &["haptic-core", "haptic-log", "haptic-sim"]),
     ("host-sim/metrics", &["haptic-log"]),
     ("host-sim/vehicle", &["haptic-log"]),

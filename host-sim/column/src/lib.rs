@@ -16,6 +16,7 @@ mod assist;
 pub mod linear;
 mod parameters;
 mod plant;
+pub mod study;
 mod through_bar;
 
 pub use assist::{Assist, Curve};

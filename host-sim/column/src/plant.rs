@@ -119,6 +119,11 @@ impl Plant {
         &self.state
     }
 
+    /// phi_c, rad.
+    pub fn column_angle_rad(&self) -> f64 {
+        self.state[COLUMN]
+    }
+
     /// T_tb, the torque that passes through the bar, N.m.
     pub fn bar_torque_nm(&self) -> f64 {
         self.bar_of(&self.state)

@@ -3,3 +3,4 @@
 mod curve;
 mod peers;
 mod physics;
+mod studies;
