@@ -91,7 +91,7 @@ const PACKAGES: Arrows = &[
     ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("host-sim/pil", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
-    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
+    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-column", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
     // Beside these the command line's own parts, of host-sim.
     ("host-sim/evidence", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-core", "haptic-log", "haptic-report", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("bindings/c", &["haptic-core"]),

@@ -30,7 +30,7 @@ pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("host-sim/log", 5_700),
     ("host-sim/metrics", 600),
     ("host-sim/pil", 2_200),
-    ("host-sim/report", 5_900),
+    ("host-sim/report", 6_100),
     ("host-sim/sim", 8_800),
     ("host-sim/vectorised", 2_800),
     ("host-sim/vehicle", 1_700),
