@@ -66,7 +66,7 @@ fn a_stiff_bar_without_assist_is_the_paper_s_column() {
     assert!(with(1e6, 0.002) > 3.0 * stiff);
 }
 
-/// With the bar's steps by Runge-Kutta, as a tenth of a millinewton metre of friction asks for.
+/// A nanonewton metre of friction is enough to be stepped by Runge-Kutta.
 #[test]
 fn exact_steps_and_those_of_runge_kutta_agree() {
     let smooth = BarParameters::default().linear();

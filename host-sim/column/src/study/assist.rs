@@ -62,7 +62,7 @@ pub struct LoopRow {
     pub speed_kmh: f64,
     /// Its largest slope there.
     pub slope: f64,
-    /// With a free wheel, and with one that is held; none where the closed loop is unstable.
+    /// For a free wheel, and for one that is held; none where the closed loop is unstable.
     pub margins: [Option<Margins>; 2],
 }
 
@@ -137,7 +137,7 @@ pub struct Case {
 pub struct Driven {
     /// Largest lateral error, m; none where the vehicle left the road.
     pub peak_m: Option<f64>,
-    /// The same drive with the guidance's torque lost at once in the bend, m.
+    /// Largest lateral error where the guidance's torque is lost at once in the bend, m; none off the road, and by hand.
     pub lost_peak_m: Option<f64>,
     /// Margins of the loop through eyes and arm, on a straight; none where the loop is unstable or on the paper's column.
     pub eyes: Option<Margins>,

@@ -25,7 +25,7 @@ pub const RATES: [Rate; 2] = [Rate::EveryStep, Rate::Camera];
 pub const BANDWIDTHS: [f64; 6] = [10.0, 20.0, 30.0, 60.0, 100.0, 214.0];
 /// How hard the hands steer, N.m.
 pub const HANDS_NM: f64 = 1.5;
-/// How far J_w and K_tb are believed wrong.
+/// How far J_w is believed wrong.
 pub const WRONG_J_W: f64 = 0.3;
 /// How far K_tb is believed wrong.
 pub const WRONG_K_TB: f64 = 0.1;
