@@ -178,8 +178,8 @@ impl Observer {
     /// A millisecond on: the new angle; the rate moves with what is left of the torques.
     fn predict(&self, state: &mut State, angle: I32F32, bar: I8F24) -> I32F32 {
         // The mean of the bar's torque over the step.
-        let mean =
-            I8F24::saturating_from_num(I40F24::from(bar).saturating_add(I40F24::from(state.bar)) >> 1_u32);
+        let sum = I40F24::from(bar).saturating_add(I40F24::from(state.bar));
+        let mean = I8F24::saturating_from_num(I40F24::from_bits(sum.to_bits() >> 1));
         let left = state.beside.saturating_sub(mean);
         let change = rounded(left.wide_mul(self.setup.by_torque).to_bits(), 24);
         let before = state.rate;
