@@ -78,10 +78,12 @@ const SIDE_BY_SIDE: [&str; 3] = [
 const PACKAGES: Arrows = &[
     ("core", &[]),
     ("core/diag", &["haptic-core"]),
+    ("core/observer", &["haptic-core"]),
     ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
+    ("host-sim/column", &["haptic-core", "haptic-observer", "haptic-sim"]),
     ("host-sim/vectorised", &["haptic-core", "haptic-log", "haptic-sim"]),
     ("host-sim/metrics", &["haptic-log"]),
     ("host-sim/vehicle", &["haptic-log"]),
@@ -89,7 +91,7 @@ const PACKAGES: Arrows = &[
     ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("host-sim/pil", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
-    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
+    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-column", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
     // Beside these the command line's own parts, of host-sim.
     ("host-sim/evidence", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-core", "haptic-log", "haptic-report", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("bindings/c", &["haptic-core"]),

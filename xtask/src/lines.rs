@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 24] = [
+pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -17,6 +17,7 @@ pub(crate) const BUDGETS: [(&str, usize); 24] = [
     ("bindings/web", 600),
     ("core", 7_200),
     ("core/diag", 1_600),
+    ("core/observer", 400),
     ("examples", 200),
     ("firmware", 2_800),
     ("firmware/lockstep", 200),
@@ -24,11 +25,12 @@ pub(crate) const BUDGETS: [(&str, usize); 24] = [
     ("host-sim/analysis", 9_100),
     ("host-sim/batch", 9_200),
     ("host-sim/campaign", 4_000),
+    ("host-sim/column", 1_400),
     ("host-sim/evidence", 6_900),
     ("host-sim/log", 5_800),
     ("host-sim/metrics", 600),
     ("host-sim/pil", 2_200),
-    ("host-sim/report", 5_900),
+    ("host-sim/report", 6_100),
     ("host-sim/sim", 8_800),
     ("host-sim/vectorised", 2_800),
     ("host-sim/vehicle", 1_700),

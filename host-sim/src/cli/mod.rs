@@ -7,6 +7,7 @@
 //! What `haptic-evidence` needs too is public. One file per command; their groups in `--help` are in `names`. Not here: anything that a study or a model decides.
 
 mod adaptation;
+mod assist;
 pub mod checkpoint;
 mod compare;
 mod convert;
@@ -97,6 +98,14 @@ enum Command {
     ///
     /// Small gain, equilibria, swings.
     Adaptation(adaptation::Arguments),
+    /// Guidance beside power assist, through a torsion bar
+    ///
+    /// Overlay or offset: what the hands feel, margins, what a sudden loss costs.
+    Assist(assist::Arguments),
+    /// The hands' torque through a torsion bar, by the sensor
+    ///
+    /// How late and how wrong an observer tells it, by the steps and the rate of the angle.
+    DriverTorque(assist::SensorArguments),
     /// A road from a file: its lane, length, picture and centre
     Course(course::Arguments),
     /// A map over speed and delay: where a driver keeps the lane
@@ -203,6 +212,8 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Sweep(arguments) => sweep::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Adaptation(arguments) => adaptation::run(arguments),
+        Command::Assist(arguments) => assist::run(arguments),
+        Command::DriverTorque(arguments) => assist::sensors(arguments),
         Command::DesignGuidance(arguments) => design_guidance::run(arguments),
         Command::Course(arguments) => course::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),

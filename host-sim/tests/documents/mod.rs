@@ -12,12 +12,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates whose README is checked; the bindings' are checked by their own tools.
-const CRATES: [&str; 15] = [
+const CRATES: [&str; 17] = [
     "core",
+    "core/observer",
     "firmware",
     "firmware/lockstep",
     "host-sim",
     "host-sim/sim",
+    "host-sim/column",
     "host-sim/vectorised",
     "host-sim/log",
     "host-sim/analysis",

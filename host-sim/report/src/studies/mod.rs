@@ -17,6 +17,7 @@ pub mod run;
 pub mod stability;
 pub mod study;
 pub mod sweep;
+pub mod torsion_bar;
 pub mod vehicle;
 
 use crate::document::WriteError;

@@ -1,0 +1,4 @@
+//! Tests of the observer, one file per theme.
+
+mod limits;
+mod oracle;

@@ -1,0 +1,233 @@
+//! What a sensor has to deliver: how late and how wrong the observer of `haptic-observer` tells the torque of the hands, by the steps and
+//! the rate of the angle's sensor, the observer's bandwidth, and what is believed of J_w and K_tb.
+//!
+//! The car is that of the column with the medium assist at 60 km/h; its angle is the column's. In the first half the hands steer with
+//! [`HANDS_NM`] at 0.4 Hz and half of it at 1.1 Hz while the guidance moves the column; in the second nobody holds the wheel.
+
+use std::f64::consts::TAU;
+
+use haptic_core::quantity::{Radians, Torque};
+use haptic_observer::{Observer, Parameters, Reading, Setup, SetupError, State};
+use haptic_sim::models::nonlinear::WorldParameters;
+use haptic_sim::models::sensors::camera_looks;
+use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::parts::{Acting, Vehicle};
+use serde::Serialize;
+
+use super::{ColumnFile, rms};
+use crate::{Assist, ColumnError, Plant};
+
+/// Steps of the angle's sensor, degrees, and its rates, Hz.
+pub const STEPS_DEG: [f64; 3] = [0.005, 0.02, 0.1];
+/// Rates of the angle's sensor.
+pub const RATES: [Rate; 2] = [Rate::EveryStep, Rate::Camera];
+/// Bandwidths of the observer, rad/s.
+pub const BANDWIDTHS: [f64; 6] = [10.0, 20.0, 30.0, 60.0, 100.0, 214.0];
+/// How hard the hands steer, N.m.
+pub const HANDS_NM: f64 = 1.5;
+/// How far J_w is believed wrong.
+pub const WRONG_J_W: f64 = 0.3;
+/// How far K_tb is believed wrong.
+pub const WRONG_K_TB: f64 = 0.1;
+/// Steps of each half, and those at its beginning that nothing is judged by.
+const HALF: usize = 20_000;
+const SETTLES: usize = 2_000;
+
+/// How often an angle is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rate {
+    /// 1 kHz.
+    EveryStep,
+    /// 120 Hz, on the grid of 1 ms.
+    Camera,
+}
+
+impl Rate {
+    /// In Hz.
+    pub fn hz(self) -> f64 {
+        match self {
+            Self::EveryStep => 1000.0,
+            Self::Camera => 120.0,
+        }
+    }
+}
+
+/// An observer with a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Row {
+    /// Step of the angle, degrees.
+    pub step_deg: f64,
+    /// How often it comes.
+    pub rate: Rate,
+    /// Bandwidth, rad/s.
+    pub bandwidth: f64,
+    /// How late it is, ms.
+    pub lag_ms: f64,
+    /// Deviation of the estimate from the hands' torque of so long ago, with what is believed right, N.m.
+    pub error_nm: f64,
+    /// The larger of those for J_w 30 % too low and too high, N.m.
+    pub wrong_j_w_nm: f64,
+    /// The larger of those for K_tb 10 % too low and too high, N.m.
+    pub wrong_k_tb_nm: f64,
+    /// What it says where nobody holds the wheel: root of the mean square, N.m.
+    pub no_hand_nm: f64,
+}
+
+/// What came of all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// What the bar's sensor itself is off by, N.m: its own reading taken for the hands', without any lag.
+    pub bar_alone_nm: f64,
+    /// What the bar's sensor says where nobody holds the wheel, N.m.
+    pub bar_no_hand_nm: f64,
+    /// By step, rate and bandwidth.
+    pub rows: Vec<Row>,
+}
+
+impl Results {
+    /// The bandwidth with the least deviation for each sensor, with what is believed right.
+    pub fn best(&self) -> Vec<&Row> {
+        let sensors = RATES
+            .into_iter()
+            .flat_map(|rate| STEPS_DEG.map(|step| (rate, step)));
+        let of = |(rate, step): (Rate, f64)| {
+            let own = self
+                .rows
+                .iter()
+                .filter(move |row| row.rate == rate && row.step_deg == step);
+            own.min_by(|a, b| a.error_nm.total_cmp(&b.error_nm))
+        };
+        sensors.filter_map(of).collect()
+    }
+}
+
+/// Why there are no results.
+#[derive(Debug, thiserror::Error)]
+pub enum SensorsError {
+    /// A column that cannot be.
+    #[error(transparent)]
+    Column(#[from] ColumnError),
+    /// A column that the observer cannot be set up for.
+    #[error("the observer: {0}")]
+    Setup(SetupError),
+}
+
+/// What was seen in a millisecond.
+struct Seen {
+    hands_nm: f64,
+    bar_nm: f64,
+    column_rad: f64,
+}
+
+fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ColumnError> {
+    let curves = file.curves();
+    let curve = curves
+        .iter()
+        .find(|(name, _)| *name == "medium")
+        .unwrap_or(&curves[0]);
+    let (vehicle, world) = (VehicleParameters::default(), WorldParameters::default());
+    let mut plant = Plant::new(file.column, Assist::Points(curve.1.clone()), &vehicle, &world, 45)?;
+    let mut seen = Vec::with_capacity(HALF);
+    for k in 0..HALF {
+        let t = 1e-3 * k as f64;
+        let hands_nm = if is_held {
+            HANDS_NM * ((TAU * 0.4 * t).sin() + 0.5 * (TAU * 1.1 * t).sin())
+        } else {
+            0.0
+        };
+        // A guidance that steers slowly, and its probe.
+        let guidance_nm = 0.5 * (TAU * 0.2 * t).sin() + 0.2 * (TAU * 3.0 * t).sin();
+        seen.push(Seen {
+            hands_nm,
+            bar_nm: plant.sensor_torque_nm(),
+            column_rad: plant.column_angle_rad(),
+        });
+        plant.step(&Acting {
+            driver_torque_nm: hands_nm,
+            guidance_torque_nm: guidance_nm,
+            speed_m_per_s: [60.0 / 3.6; 2],
+            bank_rad: 0.0,
+        });
+    }
+    Ok(seen)
+}
+
+/// What an observer says of a record, less the hands' torque of its lag ago: root of the mean square, N.m.
+fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
+    let observer = Observer::new(Setup::new(of).map_err(SensorsError::Setup)?);
+    let (mut state, step_rad) = (State::default(), step_deg.to_radians());
+    let lag = f64::from(observer.setup().lag_us()) * 1e-3;
+    let (whole, rest) = (lag.floor() as usize, lag.fract());
+    let errors = seen.iter().enumerate().map(|(k, now)| {
+        let is_sampled = rate == Rate::EveryStep || camera_looks(k as u32);
+        let angle = is_sampled.then(|| Radians::from_rad((now.column_rad / step_rad).round() * step_rad));
+        let bar_torque = Torque::from_nm(now.bar_nm);
+        let found = observer
+            .step(&mut state, &Reading { bar_torque, angle })
+            .hands
+            .nm();
+        let ago = |steps: usize| k.checked_sub(steps).map_or(0.0, |at| seen[at].hands_nm);
+        found - ((1.0 - rest) * ago(whole) + rest * ago(whole + 1))
+    });
+    let errors: Vec<f64> = errors.collect();
+    Ok(rms(errors.into_iter().skip(SETTLES)))
+}
+
+/// Sets every observer before every sensor.
+///
+/// # Errors
+/// A column that cannot be.
+pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
+    let [held, free] = [record(file, true)?, record(file, false)?];
+    let column = &file.column;
+    let mut rows = Vec::new();
+    for rate in RATES {
+        for step_deg in STEPS_DEG {
+            for bandwidth in BANDWIDTHS.into_iter().filter(|w| *w <= rate.hz()) {
+                let right = Parameters {
+                    j_w: column.j_w_kg_m2,
+                    b_w: column.b_w_nms_per_rad,
+                    friction_nm: column.upper_friction_nm,
+                    friction_give_rad: column.friction_give_rad,
+                    k_tb: column.k_tb_nm_per_rad,
+                    sample_ms: 1000.0 / rate.hz(),
+                    bandwidth,
+                    ..Parameters::default()
+                };
+                let error = |of: Parameters| deviation(&of, &held, step_deg, rate);
+                let wrong = |change: &dyn Fn(f64) -> Parameters, by: f64| {
+                    Ok::<_, SensorsError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
+                };
+                rows.push(Row {
+                    step_deg,
+                    rate,
+                    bandwidth,
+                    lag_ms: 1e-3 * f64::from(Setup::new(&right).map_err(SensorsError::Setup)?.lag_us()),
+                    error_nm: error(right)?,
+                    wrong_j_w_nm: wrong(
+                        &|share| Parameters {
+                            j_w: share * right.j_w,
+                            ..right
+                        },
+                        WRONG_J_W,
+                    )?,
+                    wrong_k_tb_nm: wrong(
+                        &|share| Parameters {
+                            k_tb: share * right.k_tb,
+                            ..right
+                        },
+                        WRONG_K_TB,
+                    )?,
+                    no_hand_nm: deviation(&right, &free, step_deg, rate)?,
+                });
+            }
+        }
+    }
+    let bar = |seen: &[Seen]| rms(seen.iter().skip(SETTLES).map(|now| now.bar_nm - now.hands_nm));
+    Ok(Results {
+        bar_alone_nm: bar(&held),
+        bar_no_hand_nm: bar(&free),
+        rows,
+    })
+}

@@ -1,0 +1,6 @@
+//! Tests of the column with a torsion bar, one file per theme.
+
+mod curve;
+mod peers;
+mod physics;
+mod studies;

@@ -1,0 +1,233 @@
+//! The paper's column as a limit, energy, resonances, and what the sensor says.
+
+use std::f64::consts::TAU;
+
+use haptic_column::linear::{Hands, Linear};
+use haptic_column::{Assist, BarParameters, Curve, Inject, Plant, ThroughBar};
+use haptic_sim::Scenario;
+use haptic_sim::models::nonlinear::WorldParameters;
+use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::parts::{Acting, DriverVehicle, NoDriver, PaperVehicle, Vehicle};
+
+pub(crate) const V: f64 = 60.0 / 3.6;
+
+pub(crate) fn plant(bar: BarParameters, assist: Assist) -> Plant {
+    plant_in(bar, assist, &VehicleParameters::default())
+}
+
+fn plant_in(bar: BarParameters, assist: Assist, vehicle: &VehicleParameters) -> Plant {
+    Plant::new(bar, assist, vehicle, &WorldParameters::default(), 7).unwrap()
+}
+
+pub(crate) fn acting(hands_nm: f64, guidance_nm: f64) -> Acting {
+    Acting {
+        driver_torque_nm: hands_nm,
+        guidance_torque_nm: guidance_nm,
+        speed_m_per_s: [V; 2],
+        bank_rad: 0.0,
+    }
+}
+
+/// Torques of hands and guidance in a step, N.m.
+fn torques(k: u32) -> [f64; 2] {
+    let t = f64::from(k) * 1e-3;
+    [1.5 * (TAU * 0.6 * t).sin(), 0.5 * (TAU * 1.3 * t).cos() - 0.5]
+}
+
+/// The largest difference of the wheel's angle from the paper's column over 10 s, rad.
+fn apart_rad(bar: BarParameters) -> f64 {
+    let mut bar = plant(bar.linear(), Assist::None);
+    let mut paper = PaperVehicle::new(&Scenario::default());
+    let mut most: f64 = 0.0;
+    for k in 0..10_000 {
+        let [hands, guidance] = torques(k);
+        bar.step(&acting(hands, guidance));
+        paper.step(&acting(hands, guidance));
+        most = most.max((bar.motion().wheel_angle_rad - paper.motion().wheel_angle_rad).abs());
+    }
+    assert!(paper.motion().wheel_angle_rad.abs() > 1e-4);
+    most
+}
+
+/// What is left with a stiff bar is the lag of the motor, which the paper's column has not: it falls with it.
+#[test]
+fn a_stiff_bar_without_assist_is_the_paper_s_column() {
+    let with = |k_tb_nm_per_rad, motor_lag_s| {
+        let bar = BarParameters {
+            k_tb_nm_per_rad,
+            motor_lag_s,
+            ..BarParameters::default()
+        };
+        apart_rad(bar)
+    };
+    let [usual, stiff] = [with(143.24, 0.0002), with(1e6, 0.0002)];
+    assert!(stiff < 2e-4, "{stiff}");
+    assert!(usual > 1e-3 && usual < 0.05, "{usual}");
+    assert!(with(1e6, 0.002) > 3.0 * stiff);
+}
+
+/// A nanonewton metre of friction is enough to be stepped by Runge-Kutta.
+#[test]
+fn exact_steps_and_those_of_runge_kutta_agree() {
+    let smooth = BarParameters::default().linear();
+    let mut exact = plant(smooth, Assist::None);
+    let mut by_steps = plant(
+        BarParameters {
+            lower_friction_nm: 1e-9,
+            ..smooth
+        },
+        Assist::None,
+    );
+    for k in 0..5000 {
+        let [hands, guidance] = torques(k);
+        exact.step(&acting(hands, guidance));
+        by_steps.step(&acting(hands, guidance));
+    }
+    for (state, (a, b)) in exact.state().iter().zip(by_steps.state()).enumerate() {
+        // How far friction has given is another question.
+        if ![4, 7].contains(&state) {
+            assert!((a - b).abs() < 2e-6 * (1.0 + a.abs()), "state {state}: {a} {b}");
+        }
+    }
+}
+
+/// Work of hands, motor and tyres is what moves, what is in the bar, and what damping and friction took, here summed by the
+/// trapezoidal rule. Friction after Dahl keeps F z^2 / (2 give) and takes the rest.
+#[test]
+fn no_energy_is_lost_or_found() {
+    let vehicle = VehicleParameters::default();
+    let bar = BarParameters {
+        b_tb_nms_per_rad: 0.1,
+        sensor_noise_nm: 0.0,
+        ..BarParameters::default()
+    };
+    let mut plant = plant(bar, Assist::Points(Curve::usual(1.0)));
+    let (j_c, b_c) = (vehicle.j_s - bar.j_w_kg_m2, vehicle.b_s - bar.b_w_nms_per_rad);
+    let stored = |x: &[f64; 13]| {
+        let friction = |nm: f64, z: f64| nm * z * z / (2.0 * bar.friction_give_rad);
+        0.5 * (bar.j_w_kg_m2 * x[3] * x[3] + j_c * x[6] * x[6] + bar.k_tb_nm_per_rad * (x[2] - x[5]).powi(2))
+            + friction(bar.upper_friction_nm, x[4])
+            + friction(bar.lower_friction_nm, x[7])
+    };
+    let k_aln = vehicle.aligning_stiffness();
+    let power = |x: &[f64; 13], hands_nm: f64| {
+        let aligning = -k_aln * (vehicle.k_t * x[5] - (x[0] + vehicle.l_f * x[1]) / V);
+        // |w| z^2 / give^2 is what Dahl's friction turns into heat.
+        let slides = |nm: f64, w: f64, z: f64| nm * w.abs() * (z / bar.friction_give_rad).powi(2);
+        let heat = bar.b_w_nms_per_rad * x[3] * x[3]
+            + b_c * x[6] * x[6]
+            + bar.b_tb_nms_per_rad * (x[3] - x[6]).powi(2)
+            + slides(bar.upper_friction_nm, x[3], x[4])
+            + slides(bar.lower_friction_nm, x[6], x[7]);
+        hands_nm * x[3] + (x[10] + aligning) * x[6] - heat
+    };
+    let (mut given, mut moved) = (0.0, 0.0_f64);
+    for k in 0..8000 {
+        let [hands, guidance] = torques(k);
+        let before = power(plant.state(), hands);
+        plant.step(&acting(hands, guidance));
+        given += 0.5e-3 * (before + power(plant.state(), hands));
+        moved = moved.max(stored(plant.state()));
+    }
+    let balance = given - stored(plant.state());
+    assert!(
+        moved > 0.01 && balance.abs() < 0.01 * moved,
+        "{balance} of {moved} J"
+    );
+}
+
+/// By hand: sqrt(143.24/0.044)/2 pi = 9.08 Hz with the column held (heavy); with it free sqrt(143.24 (1/0.044 + 1/0.066))/2 pi =
+/// 11.72 Hz, a little more with the tyres' stiffness.
+#[test]
+fn the_wheel_on_its_bar_swings_where_arithmetic_says() {
+    let hz = |vehicle: &VehicleParameters| {
+        let linear = Linear::new(&plant_in(BarParameters::default(), Assist::None, vehicle), V, 0.0);
+        let fast = linear.eigenvalues(Hands::Free).into_iter();
+        let fast = fast
+            .filter(|[re, im]| *im > 30.0 && *re > -300.0)
+            .map(|[re, im]| re.hypot(im) / TAU);
+        fast.fold(0.0, f64::max)
+    };
+    let held = VehicleParameters {
+        j_s: 2.0,
+        b_s: 0.57,
+        ..Default::default()
+    };
+    let by_hand = (143.24_f64 * (1.0 / 0.044 + 1.0 / 1.956)).sqrt() / TAU;
+    assert!((hz(&held) / by_hand - 1.0).abs() < 0.01, "{}", hz(&held));
+    let free = (143.24_f64 * (1.0 / 0.044 + 1.0 / 0.066)).sqrt() / TAU;
+    assert!((free - 11.72).abs() < 0.01 && (hz(&VehicleParameters::default()) / free - 1.0).abs() < 0.02);
+}
+
+/// A heavy slow turn of the hands: the sensor reads what passes through the bar, in steps, up to its range, on both sides.
+#[test]
+fn the_sensor_has_its_range_resolution_and_offset() {
+    for side in [1.0, -1.0] {
+        let bar = BarParameters {
+            sensor_offset_nm: side * 0.2,
+            sensor_noise_nm: 0.0,
+            ..BarParameters::default()
+        };
+        let mut weak = plant(bar, Assist::None);
+        let mut strong = weak.clone();
+        for _ in 0..4000 {
+            weak.step(&acting(side * 2.0, 0.0));
+            strong.step(&acting(side * 15.0, 0.0));
+        }
+        let read = weak.sensor_torque_nm();
+        let steps = read / bar.sensor_resolution_nm;
+        assert!((steps - steps.round()).abs() < 1e-6, "{read}");
+        assert!(
+            (read - weak.bar_torque_nm() - side * 0.2).abs() < 0.0026,
+            "{read} {}",
+            weak.bar_torque_nm()
+        );
+        assert!(
+            (strong.sensor_torque_nm() - side * 10.0).abs() < 1e-9,
+            "{}",
+            strong.sensor_torque_nm()
+        );
+    }
+}
+
+/// By hand for hands that hold the wheel, slope g = 4, the tyres' stiffness small beside the bar: of 1 N.m behind the assist the hands
+/// feel 1/(1 + g) = 0.2, in front of it g/(1 + g) = 0.8 N.m.
+#[test]
+fn the_assist_takes_an_overlay_and_gives_an_offset() {
+    for (inject, expected) in [(Inject::Overlay, 0.2), (Inject::Offset, 0.8)] {
+        let bar = BarParameters {
+            inject,
+            ..BarParameters::default()
+        };
+        let linear = Linear::new(&plant(bar, Assist::Slope(4.0)), V, 0.0);
+        let [felt, motor] = linear.guidance(Hands::Fixed, 0.0, 0.01).unwrap();
+        assert!((felt.norm() / expected - 1.0).abs() < 0.02, "{inject:?}: {felt}");
+        // What the motor does is what turns the column: but for the tyres' part, the torque of the bar.
+        assert!(felt.re < 0.0 && (motor.re + felt.re).abs() < 0.05, "{motor}");
+    }
+}
+
+/// Nobody steers; the guidance sees the bar and not the hands' nothing.
+#[test]
+fn the_guidance_reads_the_bar() {
+    let bar = BarParameters {
+        sensor_noise_nm: 0.0,
+        ..BarParameters::default()
+    };
+    let mut car = ThroughBar::new(
+        NoDriver {
+            look_ahead_s: [0.3, 1.0],
+        },
+        plant(bar, Assist::None),
+    );
+    let scenario = Scenario::default();
+    let simulation = haptic_sim::Simulation::new(&scenario);
+    let view = simulation.view().unwrap();
+    let mut most: f64 = 0.0;
+    for _ in 0..20 {
+        most = most.max(car.drive(&view, 0.0).abs());
+        car.advance(&acting(9.0, 3.0));
+    }
+    assert!(most > 0.1 && car.hands_torque_nm() == 0.0, "{most}");
+    assert!((car.motor_torque_nm() - 3.0).abs() < 1e-3);
+}

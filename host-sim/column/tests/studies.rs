@@ -1,0 +1,93 @@
+//! The studies, against what is known without them.
+
+use haptic_column::study::assist::{Column, Group, Study};
+use haptic_column::study::{ColumnFile, sensors};
+use haptic_column::{BarParameters, Inject};
+
+/// By hand, from the points: at 60 km/h medium's slope is 0.5 on a straight and 3.5 at 2 N.m; held hands feel 1/(1 + g) of an overlay
+/// and g/(1 + g) of an offset, and the motor gives a free wheel 1 and g.
+#[test]
+fn what_is_felt_is_what_the_slope_says() {
+    let study = Study::default();
+    let results = study.summarise(&[], &[]).unwrap();
+    let mut seen = 0;
+    for row in &results.felt {
+        if (row.curve, row.speed_kmh) != ("medium", 60.0) {
+            continue;
+        }
+        seen += 1;
+        let g = if row.working_nm == 0.0 { 0.5 } else { 3.5 };
+        let [felt, free] = match row.inject {
+            Inject::Overlay => [1.0 / (1.0 + g), 1.0],
+            Inject::Offset => [g / (1.0 + g), g],
+        };
+        assert!((row.slope - g).abs() < 1e-9);
+        assert!((row.felt_nm / felt - 1.0).abs() < 0.08, "{row:?} {felt}");
+        // The wheel's inertia takes its part of a swing, and the assist answers it.
+        assert!((row.motor_free_nm / free - 1.0).abs() < 0.25, "{row:?} {free}");
+    }
+    assert_eq!(seen, 4);
+    assert_eq!(results.loops.len(), 15);
+    // More slope, less margin.
+    let phase = |at: usize| results.loops[at].margins[0].and_then(|m| m.gain).unwrap();
+    assert!(phase(0) < phase(1) && phase(1) < phase(2));
+}
+
+/// Table 8's driver with high reliance and the shortest delay: the bar changes little, a loss costs three times the peak (README).
+#[test]
+fn a_drive_through_a_bar_is_near_that_on_the_paper_s_column() {
+    let study = Study::default();
+    let cases = study.cases();
+    let of = |column| {
+        let case = cases
+            .iter()
+            .find(|case| case.column == column && case.group == Group::Conditions);
+        study.drive(case.unwrap()).unwrap()
+    };
+    let rigid = of(Column::Rigid);
+    assert!((rigid.peak_m.unwrap() - 0.1255).abs() < 0.005, "{rigid:?}");
+    assert!((rigid.lost_peak_m.unwrap() - 0.4408).abs() < 0.02, "{rigid:?}");
+    let smooth = of(Column::Smooth);
+    assert!((smooth.peak_m.unwrap() - 0.1255).abs() < 0.02, "{smooth:?}");
+    assert!((smooth.lost_peak_m.unwrap() - 0.4408).abs() < 0.06, "{smooth:?}");
+    // Friction of 0.7 N.m beside torques of that size.
+    assert!(of(Column::Bar).peak_m.unwrap() > 2.0 * smooth.peak_m.unwrap());
+}
+
+#[test]
+fn a_better_sensor_tells_the_hands_better() {
+    let results = sensors::run(&ColumnFile::default()).unwrap();
+    let best = results.best();
+    assert_eq!(best.len(), 6);
+    // Within a rate the finer step is better, and 1 kHz better than 120 Hz.
+    for k in [0, 1, 3, 4] {
+        assert!(best[k].error_nm <= best[k + 1].error_nm, "{best:?}");
+    }
+    for k in 0..3 {
+        assert!(best[k].error_nm <= best[k + 3].error_nm, "{best:?}");
+    }
+    assert!(
+        best[0].no_hand_nm < results.bar_no_hand_nm,
+        "{best:?} {results:?}"
+    );
+}
+
+#[test]
+fn a_file_names_what_is_wrong_with_it() {
+    let words = |text: &str| ColumnFile::from_toml(text).unwrap_err().to_string();
+    assert!(
+        words("[column]\nk_tb_nm_per_rad = 3\n")
+            .contains("column.k_tb_nm_per_rad = 3 N.m/rad is outside 5 to")
+    );
+    assert!(words("[colunm]\n").contains("unknown field `colunm`"));
+    assert!(
+        words("[assist]\ntorque_nm = [0, 1]\nspeed_m_per_s = [0, 9]\nassist_nm = [[0, 1]]\n")
+            .contains("a row for each speed")
+    );
+    let own = ColumnFile::from_toml(
+        "[assist]\ntorque_nm = [0, 1]\nspeed_m_per_s = [0, 9]\nassist_nm = [[0, 2], [0, 1]]\n",
+    )
+    .unwrap();
+    assert_eq!(own.curves()[0].0, "the file's");
+    assert_eq!(own.column, BarParameters::default());
+}

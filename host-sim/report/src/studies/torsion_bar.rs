@@ -1,0 +1,201 @@
+//! What the studies of a torsion bar show: overlay or offset, and what a sensor has to deliver.
+
+use crate::document::{Block, Cell, Report, Section, Table};
+use crate::plot::{Axis, Figure, Panel, Series};
+use haptic_column::Inject;
+use haptic_column::study::assist::{
+    Column, DRIVEN_KMH, Felt, Group, GroupRow, LoopRow, Results, Spread, WORKING_NM,
+};
+use haptic_column::study::sensors;
+
+/// What stands beside every result: what is not part of it.
+const LEFT_OUT: &str = "The ECU is not part of this: law (9) guides in float64. Drivers keep the gains that the paper found on a column \
+     without assist. `run` and the ECU still have the rigid column.";
+
+/// The document of overlay or offset.
+pub fn assist_report(results: &Results) -> Report {
+    let caption = "What hands that hold the wheel feel of 1 N.m of guidance, where no torque is on the bar.";
+    let felt = vec![
+        Block::figure("felt", felt_figure(results), caption),
+        Block::Table(felt_table(&results.felt)),
+    ];
+    let sections = vec![
+        Section::new("What 1 N.m of guidance becomes", felt),
+        Section::new(
+            "The loop through the assist",
+            vec![Block::Table(loops_table(&results.loops))],
+        ),
+        Section::new(
+            "The drivers of tables 5 to 8",
+            vec![Block::Table(drivers_table(&results.drivers))],
+        ),
+    ];
+    let bar = &results.column;
+    let summary = format!(
+        "A wheel of {} kg.m2 on a bar of {} N.m/rad. Overlay: guidance is added behind the assist; offset: in front of it.",
+        bar.j_w_kg_m2, bar.k_tb_nm_per_rad
+    );
+    Report {
+        notes: vec![LEFT_OUT.into()],
+        ..Report::new("Overlay or offset", summary, sections)
+    }
+}
+
+fn name(inject: Inject) -> &'static str {
+    match inject {
+        Inject::Overlay => "overlay",
+        Inject::Offset => "offset",
+    }
+}
+
+fn felt_table(rows: &[Felt]) -> Table {
+    let row = |felt: &Felt| {
+        [
+            ("Assist", Cell::text(felt.curve)),
+            ("Guidance", Cell::text(name(felt.inject))),
+            ("Speed (km/h)", Cell::number(felt.speed_kmh, 0)),
+            ("T_tb (N.m)", Cell::number(felt.working_nm, 0)),
+            ("Slope", Cell::number(felt.slope, 2)),
+            ("Felt (N.m)", Cell::number(felt.felt_nm, 2)),
+            ("Motor, wheel held (N.m)", Cell::number(felt.motor_held_nm, 2)),
+            ("Motor, wheel free (N.m)", Cell::number(felt.motor_free_nm, 2)),
+        ]
+    };
+    let caption = "Of 1 N.m that the guidance asks for at 0.5 Hz: what hands that hold the wheel feel, and what the motor does, which for an \
+                   overlay is 1 N.m less what the driver's own assist takes away";
+    Table::of_rows(caption, rows.iter().map(row))
+}
+
+fn felt_figure(results: &Results) -> Figure {
+    let mut curves: Vec<&str> = results.felt.iter().map(|felt| felt.curve).collect();
+    // In their order, which is that of the rows.
+    curves.dedup();
+    let panel = |inject: Inject| {
+        let line = |(style, curve): (usize, &&str)| {
+            let own = results
+                .felt
+                .iter()
+                .filter(|felt| (felt.inject, felt.curve, felt.working_nm) == (inject, *curve, WORKING_NM[0]));
+            Series::line(
+                curve,
+                style,
+                own.map(|felt| (felt.speed_kmh, felt.felt_nm)).collect(),
+            )
+        };
+        let y = Axis::new("Felt", "N.m").within(0.0, 1.0);
+        Panel::new(name(inject), y, curves.iter().enumerate().map(line))
+    };
+    Axis::new("Speed", "km/h").figure([panel(Inject::Overlay), panel(Inject::Offset)])
+}
+
+fn loops_table(rows: &[LoopRow]) -> Table {
+    let row = |of: &LoopRow| {
+        let [free, held] = &of.margins;
+        let number = |margins: &Option<haptic_column::linear::Margins>, which: usize| {
+            let found = margins
+                .as_ref()
+                .and_then(|m| [m.gain, m.phase_deg, Some(m.sensitivity)][which]);
+            Cell::number(found, if which == 1 { 0 } else { 1 })
+        };
+        [
+            ("Assist", Cell::text(of.curve)),
+            ("Speed (km/h)", Cell::number(of.speed_kmh, 0)),
+            ("Largest slope", Cell::number(of.slope, 1)),
+            ("Gain margin, free", number(free, 0)),
+            ("Phase margin, free (deg)", number(free, 1)),
+            ("Sensitivity, free", number(free, 2)),
+            ("Gain margin, held", number(held, 0)),
+            ("Phase margin, held (deg)", number(held, 1)),
+            ("Sensitivity, held", number(held, 2)),
+        ]
+    };
+    let caption = "Margins of the loop from motor over bar, sensor and compensator back to the motor, at the largest slope of the assist; \
+                   a dash: unstable, or no larger gain swings";
+    Table::of_rows(caption, rows.iter().map(row))
+}
+
+fn spread(of: &Option<Spread>, decimals: usize) -> Cell {
+    let words = |s: &Spread| {
+        let [least, median, most] = [s.least, s.median, s.most].map(|x| format!("{x:.decimals$}"));
+        format!("{median} ({least} to {most})")
+    };
+    Cell::Text(of.as_ref().map_or("\u{2013}".into(), words))
+}
+
+fn drivers_table(rows: &[GroupRow]) -> Table {
+    let row = |of: &GroupRow| {
+        let column = match (of.column, of.curve) {
+            (Column::Assisted(_, inject), Some(curve)) => format!("{curve}, {}", name(inject)),
+            (Column::Rigid, _) => "the paper's".into(),
+            (Column::Smooth, _) => "bar without friction".into(),
+            _ => "bar alone".into(),
+        };
+        let group = match of.group {
+            Group::Manual => "table 5, by hand",
+            Group::Guided => "table 6",
+            Group::Conditions => "tables 7, 8",
+        };
+        [
+            ("Column", Cell::Text(column)),
+            ("Drivers", Cell::text(group)),
+            (
+                "Off the road",
+                Cell::Text(format!("{} of {}", of.off_road, of.drivers)),
+            ),
+            ("Peak (m)", spread(&of.peak_m, 2)),
+            ("A loss adds (m)", spread(&of.loss_costs_m, 2)),
+            ("Phase margin (deg)", spread(&of.phase_deg, 0)),
+            ("Motor (N.m)", spread(&of.motor_nm, 2)),
+        ]
+    };
+    let caption = format!(
+        "Peak lateral error in the first bend of paper-course at {DRIVEN_KMH} km/h, what a sudden loss of the torque adds to it, the phase margin \
+         of eyes and arm on a straight, and the motor's torque for 1 N.m with this arm at the wheel: median (least to largest) of the \
+         drivers that stayed on the road"
+    );
+    Table::of_rows(caption, rows.iter().map(row))
+}
+
+/// The document of the sensors.
+pub fn sensors_report(results: &sensors::Results) -> Report {
+    let row = |row: &sensors::Row| {
+        [
+            ("Step (deg)", Cell::number(row.step_deg, 3)),
+            ("Rate (Hz)", Cell::number(row.rate.hz(), 0)),
+            ("Bandwidth (rad/s)", Cell::number(row.bandwidth, 0)),
+            ("Late (ms)", Cell::number(row.lag_ms, 0)),
+            ("Error (N.m)", Cell::number(row.error_nm, 3)),
+            ("J_w 30 % wrong (N.m)", Cell::number(row.wrong_j_w_nm, 3)),
+            ("K_tb 10 % wrong (N.m)", Cell::number(row.wrong_k_tb_nm, 3)),
+            ("No hand (N.m)", Cell::number(row.no_hand_nm, 3)),
+        ]
+    };
+    let best = "For each sensor of the angle the observer with the least error";
+    let all = "Every observer with every sensor: root of the mean square of what it says, less the hands' torque of so long ago";
+    let sections = vec![
+        Section::new(
+            "What a sensor has to deliver",
+            vec![
+                Block::Table(Table::of_rows(best, results.best().into_iter().map(row))),
+                Block::Text(format!(
+                    "The bar's own reading, taken for the hands', is off by {:.3} N.m, and says {:.3} N.m where nobody holds the wheel.",
+                    results.bar_alone_nm, results.bar_no_hand_nm
+                )),
+            ],
+        ),
+        Section::new(
+            "All",
+            vec![Block::Table(Table::of_rows(all, results.rows.iter().map(row)))],
+        ),
+    ];
+    let summary = format!(
+        "Hands that steer with {} N.m at 0.4 Hz and half of it at 1.1 Hz, guidance and probe beside them; then no hand. 60 km/h, \
+         medium assist, angle of the column.",
+        sensors::HANDS_NM
+    );
+    let note = "The ECU does not use the observer yet. One pattern of hands, a smooth road, no bumps; the angle has no noise but its steps.";
+    Report {
+        notes: vec![note.into()],
+        ..Report::new("The hands' torque through a torsion bar", summary, sections)
+    }
+}

@@ -1,0 +1,70 @@
+//! `host-sim assist` and `host-sim driver-torque`: a torsion bar, with power assist.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use haptic_batch::StudyError;
+use haptic_batch::engine::each;
+use haptic_column::study::{ColumnFile, assist, sensors};
+use haptic_report::studies::torsion_bar::{assist_report, sensors_report};
+
+use super::progress::Threads;
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, in_file, progress};
+
+/// Which column.
+#[derive(Debug, Args)]
+struct ColumnArgument {
+    /// Column and assist (TOML): `[column]` and `[assist]` (docs/explanation/torsion-bar.md); default: usual practice
+    #[arg(value_name = "COLUMN.toml")]
+    file: Option<PathBuf>,
+}
+
+impl ColumnArgument {
+    fn load(&self) -> Result<ColumnFile, BadInput> {
+        let Some(path) = &self.file else {
+            return Ok(ColumnFile::default());
+        };
+        let text = std::fs::read_to_string(path).map_err(in_file(path))?;
+        ColumnFile::from_toml(&text).map_err(in_file(path))
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    column: ColumnArgument,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    results: ResultArguments,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SensorArguments {
+    #[command(flatten)]
+    column: ColumnArgument,
+    #[command(flatten)]
+    results: ResultArguments,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let study = assist::Study {
+        file: arguments.column.load()?,
+    };
+    let output = arguments.results.begin("assist")?;
+    let cases = study.cases();
+    let drive = |case: &assist::Case| study.drive(case).map_err(|e| StudyError::from(e.to_string()));
+    let driven = progress::watched("drivers", |watch| {
+        arguments.threads.run(|| each(&cases, watch, drive))
+    })??;
+    let results = study.summarise(&cases, &driven)?;
+    output.show(&assist_report(&results), &results, true)
+}
+
+pub(super) fn sensors(arguments: &SensorArguments) -> Result<Outcome, BadInput> {
+    let file = arguments.column.load()?;
+    let output = arguments.results.begin("driver-torque")?;
+    let results = sensors::run(&file)?;
+    output.show(&sensors_report(&results), &results, true)
+}
