@@ -11,6 +11,7 @@ use toml::{Table, Value};
 
 use crate::error::StudyError;
 use crate::files::{Source, check_names};
+use crate::path;
 
 /// The laws, drivers and habits that a file may name.
 pub struct Kinds {
@@ -23,7 +24,7 @@ pub struct Kinds {
 impl Default for Kinds {
     fn default() -> Self {
         Self {
-            laws: LAWS.into(),
+            laws: LAWS.into_iter().chain([path::KIND]).collect(),
             drivers: DRIVERS.into_iter().chain(HABITS).collect(),
         }
     }
