@@ -23,7 +23,7 @@ pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("firmware/lockstep", 200),
     ("host-sim", 3_200),
     ("host-sim/analysis", 9_100),
-    ("host-sim/batch", 9_200),
+    ("host-sim/batch", 9_800),
     ("host-sim/campaign", 4_000),
     ("host-sim/column", 1_400),
     ("host-sim/evidence", 6_900),

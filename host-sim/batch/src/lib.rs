@@ -52,6 +52,7 @@ pub mod identify;
 mod metrics;
 pub mod paper;
 mod parts;
+mod path;
 mod places;
 pub mod readings;
 mod record;

@@ -20,6 +20,9 @@ pub struct Metric {
     pub unit: &'static str,
     /// Whether more of it is better.
     pub more_is_better: bool,
+    /// Whether laws are judged by it: the family of tests that are corrected together.
+    #[serde(skip)]
+    pub is_judged: bool,
 }
 
 const fn metric(name: &'static str, label: &'static str, unit: &'static str) -> Metric {
@@ -28,22 +31,33 @@ const fn metric(name: &'static str, label: &'static str, unit: &'static str) -> 
         label,
         unit,
         more_is_better: false,
+        is_judged: false,
     }
 }
 
+const fn judged(name: &'static str, label: &'static str, unit: &'static str) -> Metric {
+    Metric {
+        is_judged: true,
+        ..metric(name, label, unit)
+    }
+}
+
+/// Peak, effort and conflict among the figures: what the trade-off is between.
+pub(crate) const TRADED: [usize; 3] = [0, 4, 6];
+
 /// Every figure, in the order of `measured`. What has an entry in the list of metrics is that metric.
 pub const METRICS: [Metric; 11] = [
-    metric("peak_lateral_error_m", "Peak lateral error", "m"),
+    judged("peak_lateral_error_m", "Peak lateral error", "m"),
     metric("mean_abs_lateral_error_m", "Mean lateral error", "m"),
     metric("sdlp_m", "SDLP", "m"),
     Metric {
         more_is_better: true,
         ..metric("min_time_to_lane_crossing_s", "Minimum TLC", "s")
     },
-    metric("mean_abs_driver_torque_nm", "Mean driver torque", "N.m"),
+    judged("mean_abs_driver_torque_nm", "Mean driver torque", "N.m"),
     metric("conflict_time_share", "Conflict", "1"),
-    metric("conflict_torque_nm", "Driver torque against guidance", "N.m"),
-    metric("worst_peak_after_loss_m", "Worst peak after a sudden loss", "m"),
+    judged("conflict_torque_nm", "Driver torque against guidance", "N.m"),
+    judged("worst_peak_after_loss_m", "Worst peak after a sudden loss", "m"),
     metric("mean_peak_after_loss_m", "Mean peak after a sudden loss", "m"),
     metric("worst_peak_silent_lane_m", "Worst peak after a silent lane", "m"),
     metric(

@@ -4,11 +4,14 @@ use haptic_sim::drivers::{AnyDriver, DRIVERS, HABITS};
 use haptic_sim::input::InputError;
 use haptic_sim::kind::{Kind, Make, Parameter};
 use haptic_sim::laws::{LAWS, Law};
+use haptic_sim::models::driver::ArmGains;
+use haptic_sim::participants::participants;
 use haptic_sim::scenario::{Scenario, ScenarioError};
 use toml::{Table, Value};
 
 use crate::error::StudyError;
 use crate::files::{Source, check_names};
+use crate::path;
 
 /// The laws, drivers and habits that a file may name.
 pub struct Kinds {
@@ -21,7 +24,7 @@ pub struct Kinds {
 impl Default for Kinds {
     fn default() -> Self {
         Self {
-            laws: LAWS.into(),
+            laws: LAWS.into_iter().chain([path::KIND]).collect(),
             drivers: DRIVERS.into_iter().chain(HABITS).collect(),
         }
     }
@@ -122,6 +125,34 @@ impl<'k, P: ?Sized> Chosen<'k, P> {
             }
         }
         Ok(made)
+    }
+}
+
+impl<'k> Chosen<'k, dyn AnyDriver> {
+    /// The driver as he drives without guidance, who has other gains than with it, and the table of Wang et al. that has them; none of a
+    /// kind that is published with one set.
+    pub(crate) fn by_hand(&self, kinds: &'k [Kind<dyn AnyDriver>]) -> Option<(Self, &'static str)> {
+        let untuned = self.untuned();
+        let (values, table) = match (self.kind.name, &untuned[..]) {
+            ("participant", [number]) => {
+                let own = participants()
+                    .into_iter()
+                    .find(|p| f64::from(p.number) == number.round())?
+                    .manual;
+                (vec![own.a_1, own.a_2, own.a_3, own.t_p, own.k_d, 0.0], "table 5")
+            }
+            ("paper", [a_1, a_2, a_3, t_p, ..]) => {
+                (vec![*a_1, *a_2, *a_3, *t_p, ArmGains::MANUAL.k_d, 0.0], "table 4")
+            }
+            _ => return None,
+        };
+        let by_hand = Self {
+            name: self.name.clone(),
+            kind: kinds.iter().find(|kind| kind.name == "paper")?,
+            values: values.into_iter().map(Some).collect(),
+            around: self.around.clone(),
+        };
+        Some((by_hand, table))
     }
 }
 

@@ -78,6 +78,13 @@ impl Confidence {
         (1e12 * (1.0 - self.upper())).round() / 1e12
     }
 
+    /// The level at which several intervals hold all that they are of as often as one of this level holds its own (Bonferroni), to four
+    /// digits.
+    pub(crate) fn of_several(self, count: usize) -> Self {
+        let outside = (1.0 - self.0) / count.max(1) as f64;
+        Self((1e4 * (1.0 - outside)).ceil().min(9999.0) / 1e4)
+    }
+
     /// How many standard deviations an interval of a normal distribution reaches.
     pub(crate) fn normal(self) -> f64 {
         // The digits of tables, to the last bit as the campaign has them.
@@ -143,6 +150,16 @@ impl Mean {
             level,
         })
     }
+}
+
+/// How probable a mean as far from zero as that of these values is, where the mean of all is zero: Student's test of pairs, both sides.
+/// None of fewer than two values, or where nothing scatters.
+pub(crate) fn p_of_zero(values: &[f64]) -> Option<f64> {
+    let mean = mean(values.iter().copied())?;
+    let deviation = deviation(values, mean).filter(|deviation| *deviation > 0.0)?;
+    let count = values.len() as f64;
+    let law = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
+    Some(2.0 * law.sf(mean.abs() * count.sqrt() / deviation))
 }
 
 /// The mean with half its interval, if it has one.
@@ -246,9 +263,34 @@ fn quantile(law: &ChiSquared, share: f64) -> f64 {
     high
 }
 
+/// The places of points that no other point beats: none is at most as large in everything, and smaller in something.
+pub(crate) fn front<const N: usize>(points: &[[f64; N]]) -> Vec<usize> {
+    let beats = |a: &[f64; N], b: &[f64; N]| a.iter().zip(b).all(|(a, b)| a <= b) && a != b;
+    let is_on = |place: &usize| !points.iter().any(|other| beats(other, &points[*place]));
+    (0..points.len()).filter(is_on).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// SciPy 1.17.1: `stats.ttest_1samp([0.2, -0.1, 0.4, 0.2, 0.1], 0).pvalue`, which with four degrees of freedom has a closed form too.
+    #[test]
+    fn a_mean_is_tested_against_zero_on_both_sides() {
+        let values = [0.2, -0.1, 0.4, 0.2, 0.1];
+        for sign in [1.0, -1.0] {
+            let p = p_of_zero(&values.map(|value| sign * value)).unwrap();
+            assert!((p - 0.120_243_340_6).abs() < 1e-9, "{p}");
+        }
+        assert_eq!((p_of_zero(&[0.3]), p_of_zero(&[0.3, 0.3])), (None, None));
+    }
+
+    /// A twentieth shared among 14 is 0.00357; of one it stays.
+    #[test]
+    fn several_intervals_share_what_one_leaves_out() {
+        let of = |count| Confidence::USUAL.of_several(count).to_string();
+        assert_eq!([of(1), of(2), of(14)], ["95", "97.5", "99.65"]);
+    }
 
     /// Student's quantiles as tables print them: 95 % with 4 degrees of freedom 2.776, 99 % 4.604; the normal ones 1.960 and 2.576.
     #[test]

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use haptic_sim::input::{InputError, parse_toml};
+use haptic_sim::seeds::named;
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -10,7 +11,7 @@ use super::{Compare, METRICS, Tuning};
 use crate::engine::Faults;
 use crate::files::{Source, check_names, merge, one};
 use crate::parts::{Kinds, parts, unknown};
-use crate::places::{Drives, drives};
+use crate::places::{Drawn, Drives, drives};
 use crate::statistics::Confidence;
 
 #[derive(Deserialize)]
@@ -20,9 +21,13 @@ struct File {
     #[serde(default = "one")]
     seed: u64,
     seeds: u64,
+    #[serde(default)]
     roads: Vec<String>,
     speeds_m_per_s: Option<Vec<f64>>,
     speeds_kmh: Option<Vec<f64>>,
+    drawn: Option<Drawn>,
+    #[serde(default)]
+    drivers_are_a_sample: bool,
     #[serde(default)]
     scenario: Table,
     #[serde(default)]
@@ -46,7 +51,12 @@ struct WorldFile {
 #[serde(deny_unknown_fields)]
 struct TuningFile {
     budget: u64,
+    #[serde(default = "settles")]
+    settles: f64,
+    #[serde(default = "front")]
+    front: u64,
     seeds: u64,
+    #[serde(default)]
     roads: Vec<String>,
     speeds_m_per_s: Option<Vec<f64>>,
     speeds_kmh: Option<Vec<f64>>,
@@ -59,6 +69,16 @@ const WEIGHTS: [&str; 3] = [
     "mean_abs_driver_torque_nm",
     "conflict_torque_nm",
 ];
+/// A share of the objective that nobody would change a law for (chosen here).
+fn settles() -> f64 {
+    0.01
+}
+
+/// Enough sets to see how a law's front bends (chosen here).
+fn front() -> u64 {
+    5
+}
+
 /// Most drives of a comparison.
 const MOST_DRIVES: f64 = 1e6;
 pub(super) fn from_text<'k>(
@@ -72,10 +92,8 @@ pub(super) fn from_text<'k>(
     let laws = parts(source, "law", &tables, &kinds.laws)?;
     let drivers = parts(source, "driver", &file.driver, &kinds.drivers)?;
     let (worlds, judged) = worlds(source, &file)?;
-    let tuning = file
-        .tuning
-        .as_ref()
-        .map(|t| tuning(source, &file.scenario, t))
+    let tuning = (file.tuning.as_ref())
+        .map(|t| tuning(source, &file, t))
         .transpose()?;
     let faults = file.faults;
     for (field, count) in [
@@ -89,7 +107,12 @@ pub(super) fn from_text<'k>(
         name: file.name,
         seed: file.seed,
         laws,
+        by_hand: drivers
+            .iter()
+            .map(|driver| driver.by_hand(&kinds.drivers))
+            .collect(),
         drivers,
+        drivers_are_a_sample: file.drivers_are_a_sample,
         judged,
         worlds,
         oracles,
@@ -115,41 +138,78 @@ fn oracles(source: &Source, laws: &[Table]) -> Result<(Vec<Table>, Vec<bool>), I
 
 /// Names of the worlds, and the drives in each, one world behind the other; one world without a name if the file has none.
 fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputError> {
-    let speeds = source.speeds("", file.speeds_m_per_s.as_ref(), file.speeds_kmh.as_ref())?;
-    let drives =
-        |source: &Source, fields: &Table| drives(source, "", fields, &file.roads, &speeds, file.seeds);
+    let given = Given {
+        table: "",
+        roads: &file.roads,
+        speeds: [&file.speeds_m_per_s, &file.speeds_kmh],
+        seeds: file.seeds,
+    };
     if file.world.is_empty() {
-        return Ok((vec![String::new()], drives(source, &file.scenario)?));
+        return Ok((vec![String::new()], given.drives(source, &file.scenario, file)?));
     }
     let names: Vec<String> = file.world.iter().map(|world| world.name.clone()).collect();
     check_names(source, "world", &names)?;
-    let mut all = Drives {
-        places: Vec::new(),
-        seeds: 0,
-    };
-    for world in &file.world {
+    let of_world = |world: &WorldFile| {
         let mut fields = file.scenario.clone();
         merge(&mut fields, &world.scenario);
         let source = Source::new(format!("{}: world {}", source.name, world.name), source.folder);
-        let made = drives(&source, &fields)?;
-        all.places.extend(made.places);
-        all.seeds = made.seeds;
+        given.drives(&source, &fields, file)
+    };
+    let mut all = of_world(&file.world[0])?;
+    for world in &file.world[1..] {
+        all.places.extend(of_world(world)?.places);
     }
     Ok((names, all))
 }
 
+/// Where a file wants drives: on roads that it names at its speeds, or on drawn ones.
+struct Given<'a> {
+    table: &'static str,
+    roads: &'a [String],
+    speeds: [&'a Option<Vec<f64>>; 2],
+    seeds: u64,
+}
+
+impl Given<'_> {
+    fn drives(&self, source: &Source, fields: &Table, file: &File) -> Result<Drives, InputError> {
+        let (table, [m_per_s, kmh]) = (self.table, self.speeds);
+        let is_drawn = self.roads.is_empty() && m_per_s.is_none() && kmh.is_none();
+        match &file.drawn {
+            Some(drawn) if is_drawn => {
+                // Tuning has roads of its own.
+                let root = named(
+                    file.seed,
+                    if table.is_empty() {
+                        "judged roads"
+                    } else {
+                        "tuning roads"
+                    },
+                );
+                drawn.drives(source, table, fields, self.seeds, root)
+            }
+            Some(_) if table.is_empty() => {
+                Err(source.bad("drawn: roads and speeds are drawn, or named in roads and speeds, not both"))
+            }
+            _ => {
+                let speeds = source.speeds(table, m_per_s.as_ref(), kmh.as_ref())?;
+                drives(source, table, fields, self.roads, &speeds, self.seeds)
+            }
+        }
+    }
+}
+
 /// Every law and driver can be made, and there are not too many drives.
 fn check_parts(source: &Source, compare: &Compare) -> Result<(), InputError> {
-    let count = |drives: &Drives, sets: usize| {
+    let count = |drives: &Drives, sets: usize| -> f64 {
         (sets * compare.drivers.len() * drives.places.len()) as f64 * f64::from(drives.seeds)
     };
-    let tuned = compare
-        .tuning
-        .as_ref()
-        .map_or(0.0, |t| count(&t.drives, compare.laws.len() * t.budget as usize));
+    let laws = compare.laws.len();
+    let tuned = compare.tuning.as_ref().map_or(0.0, |t| {
+        count(&t.drives, laws * t.budget as usize) + count(&compare.judged, laws * t.front as usize)
+    });
     source.within(
         "laws x drivers x roads x speeds x seeds, with tuning",
-        tuned + count(&compare.judged, compare.laws.len()),
+        tuned + count(&compare.judged, laws),
         1.0,
         MOST_DRIVES,
         "",
@@ -164,7 +224,7 @@ fn check_parts(source: &Source, compare: &Compare) -> Result<(), InputError> {
     Ok(())
 }
 
-fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning, InputError> {
+fn tuning(source: &Source, whole: &File, file: &TuningFile) -> Result<Tuning, InputError> {
     let mut weights = vec![0.0; METRICS.len()];
     let given = file.weights.clone();
     for (name, weight) in given.unwrap_or_else(|| WEIGHTS.map(|name| (name.into(), 1.0)).into()) {
@@ -180,10 +240,18 @@ fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning
         source.within(&format!("tuning.weights.{name}"), weight, 0.0, 1e6, "")?;
         weights[place] = weight;
     }
-    let speeds = source.speeds("tuning.", file.speeds_m_per_s.as_ref(), file.speeds_kmh.as_ref())?;
+    source.within("tuning.settles", file.settles, 1e-4, 1.0, "")?;
+    let given = Given {
+        table: "tuning.",
+        roads: &file.roads,
+        speeds: [&file.speeds_m_per_s, &file.speeds_kmh],
+        seeds: file.seeds,
+    };
     Ok(Tuning {
         budget: source.count("tuning.budget", file.budget, 1.0, 10_000.0)?,
-        drives: drives(source, "tuning.", scenario, &file.roads, &speeds, file.seeds)?,
+        settles: file.settles,
+        front: source.count("tuning.front", file.front, 0.0, 100.0)?,
+        drives: given.drives(source, &whole.scenario, whole)?,
         weights,
     })
 }

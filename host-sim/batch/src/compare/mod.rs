@@ -1,8 +1,9 @@
 //! Every law against every driver: roads, speeds, seeds and failures, from one file.
 //!
-//! Each law is tuned first, with as many drives as every other ([`Tuning`]), and judged on drives with other seeds. A seed draws the same
-//! remnant, wind and sensor noise for every law, so that laws are compared pair by pair. Each judged drive is the trunk of its
-//! failures: at every instant a copy of the loop goes on without the torque, or without the lane.
+//! Each law is tuned first until its objective stops moving ([`Tuning`]), and judged on drives with other seeds. A unit ([`Unit`]) draws
+//! the same road, remnant, wind and sensor noise for every law, so that laws are compared pair by pair. Each judged drive is the trunk of its
+//! failures: at every instant a copy of the loop goes on without the torque, or without the lane. What each law trades for what is its
+//! *front*: of the sets that tuning tried, those that no other beats in peak, effort and conflict, driven again where laws are judged.
 //!
 //! - [`Compare::load`]: the file, checked; [`Kinds`]: the laws and drivers that it may name, with those of one's own.
 //! - [`Compare::run`]: tuned, driven, summed up ([`CompareResults`]).
@@ -11,11 +12,13 @@
 
 mod drive;
 mod file;
+mod front;
 mod results;
 #[cfg(test)]
 mod tests;
 mod tune;
 
+use std::ops::Range;
 use std::path::Path;
 
 use haptic_sim::drivers::AnyDriver;
@@ -31,15 +34,23 @@ use crate::statistics::Confidence;
 pub use crate::engine::{Faults, on_threads};
 pub use crate::metrics::{METRICS, Metric};
 pub use crate::parts::{Chosen, Kinds};
+pub use crate::places::Unit;
 pub use crate::statistics::Mean;
 pub use drive::Driven;
+pub use front::FrontPoint;
 pub use results::{Cell, CompareResults, DriveRow, LawResult, Ratio};
+pub use tune::TunedBy;
 
 /// How laws are tuned.
 #[derive(Debug, Clone)]
 pub struct Tuning {
-    /// Sets of parameters that are tried for each law, the untuned one included.
+    /// Most sets of parameters that are tried for a law, the untuned one included.
     pub budget: u32,
+    /// A law's tuning ends when two rounds of sets together cannot have lowered its objective by more than this share: the upper end of the
+    /// interval.
+    pub settles: f64,
+    /// Most sets of a law's front.
+    pub front: u32,
     /// What each is tried on, with every driver.
     pub drives: Drives,
     /// Weights of the metrics in the objective, in the order of [`METRICS`].
@@ -60,6 +71,10 @@ pub struct Compare<'k> {
     pub judged: Drives,
     /// Names of the worlds; one without a name if the file has none.
     pub worlds: Vec<String>,
+    /// Drivers without guidance, if they are published, and where.
+    pub by_hand: Vec<Option<(Chosen<'k, dyn AnyDriver>, &'static str)>>,
+    /// Whether the drivers are a sample of those that are meant: then means over drivers have intervals over drivers.
+    pub drivers_are_a_sample: bool,
     /// Which laws are tuned for each driver by itself: what who knows the driver could choose.
     pub oracles: Vec<bool>,
     /// How laws are tuned first, if they are.
@@ -70,14 +85,12 @@ pub struct Compare<'k> {
     pub level: Confidence,
 }
 
-/// A drive to be done.
-#[derive(Debug, Clone, Copy)]
-struct Job {
+/// Values of a law's parameters, and who drives with them.
+#[derive(Debug, Clone, PartialEq)]
+struct Set {
     law: usize,
-    set: usize,
-    driver: usize,
-    place: usize,
-    seed: u32,
+    values: Vec<f64>,
+    drivers: Range<usize>,
 }
 
 impl<'k> Compare<'k> {
@@ -96,51 +109,83 @@ impl<'k> Compare<'k> {
     /// As [`haptic_sim::scenario::ScenarioBuilder::build`] for a driver's parameters.
     pub fn run(&self, watch: &Watch<'_>) -> Result<CompareResults, StudyError> {
         let tuned = tune::tune(self, watch)?;
-        let sets: Vec<Vec<Vec<f64>>> = tuned.iter().map(|law| law.values.clone()).collect();
-        let mut jobs = self.jobs(&self.judged, |_| 1);
-        // A driver's own set has the driver's number.
-        jobs.iter_mut().for_each(|job| job.set = job.driver);
-        let driven = self.drive(&jobs, &sets, &self.judged, "judged", self.faults, watch)?;
-        Ok(results::sum_up(self, tuned, &jobs, &driven))
+        let drivers = self.drivers.len();
+        let set = |law: usize, driver: usize| Set {
+            law,
+            values: tuned[law].values[driver].clone(),
+            drivers: driver..driver + 1,
+        };
+        let sets = (0..self.laws.len()).flat_map(|law| (0..drivers).map(move |driver| (law, driver)));
+        let sets: Vec<Set> = sets.map(|(law, driver)| set(law, driver)).collect();
+        let driven = self.drive(&sets, &self.judged, "judged", self.faults, watch)?;
+        let front = front::fronts(self, &tuned, &driven, watch)?;
+        Ok(results::sum_up(self, tuned, &driven, front))
     }
 
-    fn jobs(&self, drives: &Drives, sets: impl Fn(usize) -> usize) -> Vec<Job> {
-        let mut jobs = Vec::new();
-        for law in 0..self.laws.len() {
-            for set in 0..sets(law) {
-                for driver in 0..self.drivers.len() {
-                    for place in 0..drives.places.len() {
-                        jobs.extend((0..drives.seeds).map(|seed| Job {
-                            law,
-                            set,
-                            driver,
-                            place,
-                            seed,
-                        }));
-                    }
-                }
-            }
-        }
-        jobs
+    /// How many units are judged.
+    fn units(&self) -> usize {
+        self.judged.units(self.worlds.len())
     }
 
-    /// Drives with sets of parameters for each law, in the order of the jobs.
+    /// Whether a law is no guidance.
+    fn is_none(&self, law: usize) -> bool {
+        self.laws[law].kinds() == "none"
+    }
+
+    /// Drives each set with its drivers, at each place, with each seed.
     fn drive(
         &self,
-        jobs: &[Job],
-        sets: &[Vec<Vec<f64>>],
+        sets: &[Set],
         drives: &Drives,
         stream: &str,
         faults: Faults,
         watch: &Watch<'_>,
     ) -> Result<Vec<Driven>, StudyError> {
-        each(jobs, watch, |job| {
-            let (road, speed_kmh, scenario) = &drives.places[job.place];
-            let seed = seed_of(self.seed, stream, road, *speed_kmh, job.seed);
-            let scenario = scenario.to_builder().seed(seed).build()?;
-            let law = self.laws[job.law].make(&scenario, &sets[job.law][job.set])?;
-            let driver = self.drivers[job.driver].untuned_part(&scenario)?;
-            Ok(Driven::new(&scenario, law, driver, faults))
-        })
+        let mut jobs = Vec::new();
+        for set in sets {
+            for driver in set.drivers.clone() {
+                for place in &drives.places {
+                    jobs.extend((0..drives.seeds).map(|seed| (set, driver, place, seed)));
+                }
+            }
+        }
+        each(
+            &jobs,
+            watch,
+            |&(set, driver, (road, speed_kmh, scenario), seed)| {
+                let seed = seed_of(self.seed, stream, road, *speed_kmh, seed);
+                let scenario = scenario.to_builder().seed(seed).build()?;
+                let law = self.laws[set.law].make(&scenario, &set.values)?;
+                let by_hand = self.by_hand[driver].as_ref().filter(|_| self.is_none(set.law));
+                let driver = by_hand.map_or(&self.drivers[driver], |(by_hand, _)| by_hand);
+                Ok(Driven::new(
+                    &scenario,
+                    law,
+                    driver.untuned_part(&scenario)?,
+                    faults,
+                ))
+            },
+        )
     }
+}
+
+/// The mean of each unit over its drives, of which the units are innermost, where they have values.
+fn by_unit(units: usize, values: impl Iterator<Item = Option<f64>>) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0_u32); units];
+    for (number, value) in values.enumerate() {
+        if let Some(value) = value {
+            let (sum, count) = &mut sums[number % units];
+            *sum += value;
+            *count += 1;
+        }
+    }
+    let sums = sums.into_iter().filter(|(_, count)| *count > 0);
+    sums.map(|(sum, count)| sum / f64::from(count)).collect()
+}
+
+/// A mean over units whose interval is none where nothing scattered: then nothing was drawn by chance.
+fn mean_of(values: &[f64], level: Confidence) -> Option<Mean> {
+    let mean = Mean::new(values, level)?;
+    let interval = mean.interval.filter(|[low, high]| low < high);
+    Some(Mean { interval, ..mean })
 }

@@ -5,10 +5,12 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use haptic_analysis::identify::holm;
+
 use super::tune::Tuned;
-use super::{Compare, Driven, Faults, Job, METRICS, Mean, Metric};
+use super::{Compare, Driven, Faults, FrontPoint, METRICS, Mean, Metric, TunedBy, Unit, by_unit, mean_of};
 use crate::engine::{Entry, EntryKind, Tables};
-use crate::statistics::Confidence;
+use crate::statistics::{Confidence, p_of_zero};
 
 /// A law as it was judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,8 +25,8 @@ pub struct LawResult {
     pub values: Vec<(&'static str, f64)>,
     /// Whether it was tuned for each driver by itself.
     pub oracle: bool,
-    /// The objective before and after tuning.
-    pub objective: Option<[f64; 2]>,
+    /// How it was tuned; none if there was nothing to tune.
+    pub tuning: Option<TunedBy>,
 }
 
 /// A law with a driver.
@@ -36,8 +38,11 @@ pub struct Cell {
     pub driver: usize,
     /// In the order of the metrics.
     pub values: Vec<Option<Mean>>,
-    /// Less what the first law has, drive by drive.
+    /// Less what the first law has, unit by unit.
     pub against_first: Vec<Option<Mean>>,
+    /// How probable so large a difference is where there is none, corrected by Holm's method for all cells and judged metrics; none of a
+    /// metric that is not judged by.
+    pub p_holm: Vec<Option<f64>>,
     /// Drives that left the road.
     pub off_road: usize,
     /// Drives in which the ECU ended guidance by its own decision.
@@ -55,10 +60,12 @@ pub struct Ratio {
     pub world: usize,
     /// Place of the metric.
     pub metric: usize,
-    /// The ratio of the means over drivers and places, with its interval over the seeds.
+    /// The mean over the units, each of which has its ratio of the means over all that is not the unit.
     pub mean: Mean,
-    /// The largest of a driver, and the place of that driver.
-    pub largest: (f64, usize),
+    /// How probable a ratio so far from 1 is where it is 1, corrected by Holm's method for all laws, worlds and judged metrics.
+    pub p_holm: Option<f64>,
+    /// The largest of a driver over draws, with an interval for as many drivers as there are, and the place of that driver.
+    pub largest: (Mean, usize),
 }
 
 /// A row of the table of drives.
@@ -85,16 +92,22 @@ pub struct CompareResults {
     pub laws: Vec<LawResult>,
     /// Names and kinds, as listed.
     pub drivers: Vec<[String; 2]>,
+    /// Where the gains are published with which each drives without guidance; none if nowhere, and he keeps his own.
+    pub by_hand: Vec<Option<&'static str>>,
     /// Names of the worlds; one without a name if there are none.
     pub worlds: Vec<String>,
     /// Road and speed of each place in a world.
     pub places: Vec<(String, f64)>,
     /// Drives at each place.
     pub seeds: u32,
+    /// What the intervals of a law with a driver are over, and of a law with all drivers.
+    pub units: [Unit; 2],
+    /// How many units of the first kind there are.
+    pub draws: usize,
     /// How often intervals hold what they are of.
     #[serde(skip_serializing_if = "Confidence::is_usual")]
     pub level: Confidence,
-    /// Sets that were tried for each law with something to tune.
+    /// Most sets that were tried for a law with something to tune.
     pub budget: u32,
     /// Instants of a sudden loss and of a silent lane in each drive.
     pub instants: [u32; 2],
@@ -102,6 +115,8 @@ pub struct CompareResults {
     pub cells: Vec<Cell>,
     /// By law, then world, then metric, without the first law.
     pub ratios: Vec<Ratio>,
+    /// What each law trades, by law, then peak.
+    pub front: Vec<FrontPoint>,
     /// Every judged drive.
     #[serde(skip)]
     pub rows: Vec<DriveRow>,
@@ -160,41 +175,16 @@ impl DriveRow {
 pub(super) fn sum_up(
     compare: &Compare,
     tuned: Vec<Tuned>,
-    jobs: &[Job],
     driven: &[Driven],
+    front: Vec<FrontPoint>,
 ) -> CompareResults {
-    let drivers = compare.drivers.len();
-    let each = driven.len() / (compare.laws.len() * drivers);
-    let of_cell = |law: usize, driver: usize| &driven[(law * drivers + driver) * each..][..each];
-    let seeds = compare.judged.seeds;
-    let cell = |number: usize| {
-        let (law, driver) = (number / drivers, number % drivers);
-        let (own, first) = (of_cell(law, driver), of_cell(0, driver));
-        let metric = |metric: usize| mean(seeds, compare.level, own.iter().map(|d| d.values[metric]));
-        let difference = |metric: usize| {
-            let pairs = own.iter().zip(first);
-            mean(
-                seeds,
-                compare.level,
-                pairs.map(|(own, first)| Some(own.values[metric]? - first.values[metric]?)),
-            )
-        };
-        Cell {
-            law,
-            driver,
-            values: (0..METRICS.len()).map(metric).collect(),
-            against_first: (0..METRICS.len()).map(difference).collect(),
-            off_road: own.iter().filter(|d| d.off_road).count(),
-            left_by_itself: own.iter().filter(|d| d.left_by_itself).count(),
-            failed_off_road: own.iter().map(|d| d.failed_off_road).sum(),
-        }
-    };
     let places = compare.judged.places.len() / compare.worlds.len();
     let Faults {
         sudden_loss,
         silent_lane,
         ..
     } = compare.faults;
+    let draws = compare.judged.unit;
     CompareResults {
         name: compare.name.clone(),
         metrics: METRICS.into(),
@@ -202,6 +192,9 @@ pub(super) fn sum_up(
             .map(law_result)
             .collect(),
         drivers: (compare.drivers.iter().map(|d| [d.name.clone(), d.kinds()])).collect(),
+        by_hand: (compare.by_hand.iter())
+            .map(|by_hand| by_hand.as_ref().map(|(_, table)| *table))
+            .collect(),
         places: compare
             .judged
             .places
@@ -210,79 +203,139 @@ pub(super) fn sum_up(
             .map(|(road, kmh, _)| (road.clone(), *kmh))
             .collect(),
         worlds: compare.worlds.clone(),
-        seeds,
+        seeds: compare.judged.seeds,
+        units: [
+            draws,
+            if compare.drivers_are_a_sample {
+                Unit::Driver
+            } else {
+                draws
+            },
+        ],
+        draws: compare.units(),
         level: compare.level,
         budget: compare.tuning.as_ref().map_or(0, |t| t.budget),
         instants: [sudden_loss, silent_lane],
-        cells: (0..compare.laws.len() * drivers).map(cell).collect(),
+        cells: cells(compare, driven),
         ratios: ratios(compare, driven),
-        rows: (jobs.iter().zip(driven))
-            .map(|(job, driven)| drive_row(compare, job, driven))
+        front,
+        rows: (driven.iter().enumerate())
+            .map(|(number, driven)| drive_row(compare, number, driven))
             .collect(),
     }
 }
 
-fn drive_row(compare: &Compare, job: &Job, driven: &Driven) -> DriveRow {
-    let places = compare.judged.places.len() / compare.worlds.len();
-    let (road, speed_kmh, _) = &compare.judged.places[job.place];
+fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
+    let (drivers, level) = (compare.drivers.len(), compare.level);
+    let each = driven.len() / (compare.laws.len() * drivers);
+    let of_cell = |law: usize, driver: usize| &driven[(law * drivers + driver) * each..][..each];
+    let units = |values: &mut dyn Iterator<Item = Option<f64>>| by_unit(compare.units(), values);
+    let cell = |number: usize| {
+        let (law, driver) = (number / drivers, number % drivers);
+        let (own, first) = (of_cell(law, driver), of_cell(0, driver));
+        let value = |metric: usize| units(&mut own.iter().map(|d| d.values[metric]));
+        let apart = |metric: usize| {
+            let pairs = own.iter().zip(first);
+            units(&mut pairs.map(|(own, first)| Some(own.values[metric]? - first.values[metric]?)))
+        };
+        let p = |metric: usize| p_of_zero(&apart(metric)).filter(|_| METRICS[metric].is_judged && law > 0);
+        let metrics = 0..METRICS.len();
+        Cell {
+            law,
+            driver,
+            values: (metrics.clone())
+                .map(|metric| mean_of(&value(metric), level))
+                .collect(),
+            against_first: (metrics.clone())
+                .map(|metric| mean_of(&apart(metric), level))
+                .collect(),
+            p_holm: metrics.map(p).collect(),
+            off_road: own.iter().filter(|d| d.off_road).count(),
+            left_by_itself: own.iter().filter(|d| d.left_by_itself).count(),
+            failed_off_road: own.iter().map(|d| d.failed_off_road).sum(),
+        }
+    };
+    let mut cells: Vec<Cell> = (0..compare.laws.len() * drivers).map(cell).collect();
+    correct(cells.iter_mut().flat_map(|cell| &mut cell.p_holm).collect());
+    cells
+}
+
+/// Holm's correction of a family, in place.
+fn correct(family: Vec<&mut Option<f64>>) {
+    let mut family: Vec<&mut f64> = family.into_iter().filter_map(Option::as_mut).collect();
+    let corrected = holm(&family.iter().map(|p| **p).collect::<Vec<_>>());
+    for (p, corrected) in family.iter_mut().zip(corrected) {
+        **p = corrected;
+    }
+}
+
+/// A judged drive by its number: by law, driver, place and seed.
+fn drive_row(compare: &Compare, number: usize, driven: &Driven) -> DriveRow {
+    let (drivers, all, seeds) = (
+        compare.drivers.len(),
+        compare.judged.places.len(),
+        compare.judged.seeds as usize,
+    );
+    let place = number / seeds % all;
+    let pair = number / seeds / all;
+    let (road, speed_kmh, _) = &compare.judged.places[place];
     DriveRow {
         names: [
-            compare.laws[job.law].name.clone(),
-            compare.drivers[job.driver].name.clone(),
-            compare.worlds[job.place / places].clone(),
+            compare.laws[pair / drivers].name.clone(),
+            compare.drivers[pair % drivers].name.clone(),
+            compare.worlds[place / (all / compare.worlds.len())].clone(),
             road.clone(),
         ],
         speed_kmh: *speed_kmh,
-        seed: job.seed,
+        seed: (number % seeds) as u32,
         driven: driven.clone(),
     }
 }
 
 /// Every law over the first one, where all drives of both have a value.
 fn ratios(compare: &Compare, driven: &[Driven]) -> Vec<Ratio> {
-    let (drivers, worlds, seeds) = (
-        compare.drivers.len(),
-        compare.worlds.len(),
-        compare.judged.seeds as usize,
-    );
-    let places = compare.judged.places.len() / worlds;
-    // Sums over the places of a world, by driver, then seed.
-    let sums = |law: usize, world: usize, metric: usize| -> Option<Vec<Vec<f64>>> {
+    let (drivers, worlds, level) = (compare.drivers.len(), compare.worlds.len(), compare.level);
+    let in_world = driven.len() / (compare.laws.len() * drivers * worlds);
+    // Means over the places of a world, by driver, then unit.
+    let means = |law: usize, world: usize, metric: usize| -> Option<Vec<Vec<f64>>> {
         let of_driver = |driver: usize| {
-            let mut sums = vec![0.0; seeds];
-            for place in 0..places {
-                let first = ((law * drivers + driver) * worlds + world) * places + place;
-                for (sum, drive) in sums.iter_mut().zip(&driven[first * seeds..]) {
-                    *sum += drive.values[metric]?;
-                }
-            }
-            Some(sums)
+            let first = ((law * drivers + driver) * worlds + world) * in_world;
+            let values: Option<Vec<f64>> = driven[first..][..in_world]
+                .iter()
+                .map(|d| d.values[metric])
+                .collect();
+            Some(by_unit(compare.units(), values?.into_iter().map(Some)))
         };
         (0..drivers).map(of_driver).collect()
     };
     let ratio = |law: usize, world: usize, metric: usize| {
-        let (own, first) = (sums(law, world, metric)?, sums(0, world, metric)?);
-        let of_seed = |sums: &[Vec<f64>], seed: usize| sums.iter().map(|of| of[seed]).sum::<f64>();
-        let by_seed: Vec<f64> = (0..seeds)
-            .map(|seed| of_seed(&own, seed) / of_seed(&first, seed))
-            .collect();
-        let over_seeds = Mean::new(&by_seed, compare.level)?;
-        let total = |sums: &[f64]| sums.iter().sum::<f64>();
-        let all = |sums: &[Vec<f64>]| sums.iter().map(|of| total(of)).sum::<f64>();
-        let each = own
+        let (own, first) = (means(law, world, metric)?, means(0, world, metric)?);
+        let over = |(own, first): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            own.iter().zip(first).map(|(own, first)| own / first).collect()
+        };
+        let total = |of: &[Vec<f64>], unit: usize| of.iter().map(|of| of[unit]).sum::<f64>();
+        let sum = |of: &Vec<f64>| of.iter().sum::<f64>();
+        let of_drivers: Vec<f64> = own
             .iter()
             .zip(&first)
-            .map(|(own, first)| total(own) / total(first));
-        let largest = (each.zip(0..)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+            .map(|(own, first)| sum(own) / sum(first))
+            .collect();
+        let by_unit = match compare.drivers_are_a_sample {
+            true => of_drivers.clone(),
+            false => (0..compare.units())
+                .map(|unit| total(&own, unit) / total(&first, unit))
+                .collect(),
+        };
+        let largest = (0..drivers).max_by(|a, b| of_drivers[*a].total_cmp(&of_drivers[*b]))?;
+        let of_largest = over((&own[largest], &first[largest]));
+        let away: Vec<f64> = by_unit.iter().map(|ratio| ratio - 1.0).collect();
         Some(Ratio {
             law,
             world,
             metric,
-            mean: Mean {
-                mean: all(&own) / all(&first),
-                ..over_seeds
-            },
-            largest,
+            mean: mean_of(&by_unit, level).filter(|mean| mean.mean.is_finite())?,
+            p_holm: p_of_zero(&away).filter(|_| METRICS[metric].is_judged),
+            largest: (mean_of(&of_largest, level.of_several(drivers))?, largest),
         })
     };
     let mut found = Vec::new();
@@ -291,6 +344,7 @@ fn ratios(compare: &Compare, driven: &[Driven]) -> Vec<Ratio> {
             found.extend((0..METRICS.len()).filter_map(|metric| ratio(law, world, metric)));
         }
     }
+    correct(found.iter_mut().map(|ratio| &mut ratio.p_holm).collect());
     found
 }
 
@@ -307,24 +361,6 @@ fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &boo
             .zip(tuned.values.into_iter().next().unwrap_or_default())
             .collect(),
         oracle: *oracle,
-        objective: tuned.objective,
+        tuning: tuned.by,
     }
-}
-
-/// The mean of values by place, then seed: each seed's mean over the places that have a value, then over the seeds.
-fn mean(seeds: u32, level: Confidence, values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
-    let mut sums = vec![(0.0, 0_u32); seeds as usize];
-    for (number, value) in values.enumerate() {
-        if let Some(value) = value {
-            let (sum, count) = &mut sums[number % seeds as usize];
-            *sum += value;
-            *count += 1;
-        }
-    }
-    let of_seeds: Vec<f64> = sums
-        .into_iter()
-        .filter(|(_, count)| *count > 0)
-        .map(|(sum, count)| sum / f64::from(count))
-        .collect();
-    Mean::new(&of_seeds, level)
 }

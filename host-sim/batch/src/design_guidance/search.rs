@@ -8,6 +8,7 @@ use super::evaluate::{CONFLICT, EFFORT, LOSS, NOISE, PEAK};
 use super::{DesignGuidance, Evaluated, Figures, Gains, Member, Stage, published};
 use crate::engine::Watch;
 use crate::error::StudyError;
+use crate::statistics::front;
 
 /// What a set is held to: a figure over that of the paper's gains.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -274,11 +275,4 @@ pub(super) fn ratios(set: &[Figures], paper: &[Figures], drivers: &[Member]) -> 
         ratio(CONFLICT, &with_line),
         ratio(NOISE, &all),
     ]
-}
-
-/// The places of points that no other point beats: none is at most as large in everything, and smaller in something.
-pub(super) fn front<const N: usize>(points: &[[f64; N]]) -> Vec<usize> {
-    let beats = |a: &[f64; N], b: &[f64; N]| a.iter().zip(b).all(|(a, b)| a <= b) && a != b;
-    let is_on = |place: &usize| !points.iter().any(|other| beats(other, &points[*place]));
-    (0..points.len()).filter(is_on).collect()
 }

@@ -5,12 +5,13 @@ use std::path::Path;
 use haptic_sim::scenario::{Failure, FailureKind};
 use haptic_sim::simulation::simulate;
 
-use super::search::{front, ratios};
+use super::search::ratios;
 use super::*;
 use crate::engine::Watch;
 use crate::files::Source;
 use crate::files::tests::check_refusals;
 use crate::places::seed_of;
+use crate::statistics::front;
 
 const ROAD: &str =
     "lane_width_m = 3.6\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";

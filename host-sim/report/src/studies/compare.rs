@@ -3,19 +3,12 @@
 use super::{listed, with_interval};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::compare::{Cell as Pair, CompareResults, LawResult, Metric, Ratio};
+use haptic_batch::compare::{
+    Cell as Pair, CompareResults, FrontPoint, Kinds, LawResult, Metric, Ratio, Unit,
+};
 use haptic_batch::{Confidence, Mean};
 use haptic_sim::drivers::{DRIVERS, HABITS};
 use haptic_sim::kind::{Kind, Origin};
-use haptic_sim::laws::LAWS;
-
-/// Metrics of the terminal's matrices, and of the list of what a law makes worse.
-const FIRST: [&str; 4] = [
-    "peak_lateral_error_m",
-    "mean_abs_driver_torque_nm",
-    "conflict_torque_nm",
-    "worst_peak_after_loss_m",
-];
 
 /// The document of a comparison.
 pub fn report(results: &CompareResults) -> Report {
@@ -32,14 +25,20 @@ pub fn report(results: &CompareResults) -> Report {
             caption(metric, results.level),
         );
         let table = Block::Table(matrix(results, place, metric));
-        let is_first = FIRST.contains(&metric.name);
+        let is_first = metric.is_judged;
         [figure, if is_first { table } else { table.on_page() }]
     });
     let first = &results.laws[0].name;
     let verdicts = vec![Block::Text(judgement(results)), Block::Table(worse(results))];
     let of_all = vec![Block::Table(ratios(results))];
+    let front = vec![
+        Block::figure("front", front_figure(results), front_caption(results)),
+        Block::Table(front_table(results)),
+        Block::Text(front_judgement(results)),
+    ];
     let sections = vec![
         Section::new("The laws", vec![Block::Table(laws(results))]),
+        Section::new("What each law trades", front),
         Section::new("Laws by drivers", blocks.collect()),
         Section::new(format!("All drivers, over {first}"), of_all),
         Section::new(format!("Against {first}"), verdicts),
@@ -53,21 +52,27 @@ pub fn report(results: &CompareResults) -> Report {
 
 fn summary(results: &CompareResults) -> String {
     let [losses, silences] = results.instants;
-
+    let (draws, [unit, over_all], level) = (results.draws, results.units, results.level);
+    let places = match unit {
+        Unit::Road => "roads and speeds drawn by chance".into(),
+        _ => listed(&results.places),
+    };
+    let drivers = match over_all {
+        Unit::Driver => "; of means over drivers over the drivers, which stand for others like them",
+        _ => "; the drivers are those listed, and nothing is said of others",
+    };
     format!(
-        "{} laws behind the shipping ECU, {} drivers, {}, {} seeds each. In each drive {losses} instants of a sudden loss and {silences} of \
-         a silent lane. Intervals are of {level} %, over the seeds.",
+        "{} laws behind the shipping ECU, {} drivers, {places}. In each drive {losses} instants of a sudden loss and {silences} of a silent \
+         lane. Intervals are of {level} %, over {draws} {unit}, which are the same for all laws{drivers}. What is called clear is left of \
+         Student's test of pairs after Holm's correction.",
         results.laws.len(),
         results.drivers.len(),
-        listed(&results.places),
-        results.seeds,
-        level = results.level,
     )
 }
 
 /// The laws that a file may name.
 pub fn law_kinds() -> Table {
-    kinds(LAWS.iter().map(kind))
+    kinds(Kinds::default().laws.iter().map(kind))
 }
 
 /// The drivers that a file may name, and their habits.
@@ -124,15 +129,71 @@ fn notes(results: &CompareResults) -> Vec<String> {
             pair.left_by_itself
         }),
     ];
-    all.into_iter().filter_map(counted).collect()
+    let counts = all.into_iter().filter_map(counted);
+    counts
+        .chain(unsettled(results))
+        .chain(by_hand(results))
+        .chain(unsaid(results))
+        .collect()
+}
+
+/// Laws whose objective still moved when the budget was used up.
+fn unsettled(results: &CompareResults) -> Option<String> {
+    let open = results
+        .laws
+        .iter()
+        .filter(|law| law.tuning.is_some_and(|tuning| !tuning.settled));
+    let open: Vec<&str> = open.map(|law| law.name.as_str()).collect();
+    (!open.is_empty()).then(|| {
+        format!(
+            "laws whose objective may still have moved when the budget of {} sets was used up: {}",
+            results.budget,
+            open.join(", ")
+        )
+    })
+}
+
+/// Which gains the drivers have without guidance.
+fn by_hand(results: &CompareResults) -> Option<String> {
+    let none = results.laws.iter().find(|law| law.kind == "none")?;
+    let drivers = results.drivers.iter().zip(&results.by_hand);
+    let told = drivers.map(|([name, _], table)| {
+        let gains = table.map_or("as with guidance, none are published".into(), |table| {
+            format!("{table} of Wang et al. 2022")
+        });
+        format!("{name} ({gains})")
+    });
+    let told: Vec<String> = told.collect();
+    Some(format!(
+        "the drivers' gains by hand, under {}: {}",
+        none.name,
+        told.join(", ")
+    ))
+}
+
+/// Means that have no interval, and are not shown.
+fn unsaid(results: &CompareResults) -> Option<String> {
+    let values = results.cells.iter().flat_map(|pair| &pair.values).flatten();
+    let count = values.filter(|mean| mean.interval.is_none()).count();
+    let why = match results.draws {
+        1 => "there is a single draw",
+        _ => "nothing in them was drawn by chance, or they are the same in every draw",
+    };
+    (count > 0).then(|| format!("{count} means have no interval, and are not shown: {why}"))
+}
+
+/// A mean with half its interval; a dash for one without.
+fn said(value: Option<&Mean>) -> String {
+    with_interval(value.filter(|mean| mean.interval.is_some()))
 }
 
 fn laws(results: &CompareResults) -> Table {
     let row = |law: &LawResult| {
         let value = |(name, value): &(&str, f64)| format!("{name} {}", rounded(*value));
         let values: Vec<String> = law.values.iter().map(value).collect();
-        let [before, after] = Cell::ends(law.objective, 4);
-        let found = match law.oracle && law.objective.is_some() {
+        let tuning = law.tuning.as_ref();
+        let objective = |end: usize| Cell::Text(said(tuning.map(|tuning| &tuning.objective[end])));
+        let found = match law.oracle && law.tuning.is_some() {
             true => "for each driver by itself".into(),
             false => values.join(", "),
         };
@@ -140,16 +201,24 @@ fn laws(results: &CompareResults) -> Table {
             ("Law", Cell::text(&law.name)),
             ("Kind", Cell::text(&law.kind)),
             ("Source", Cell::text(law.source)),
-            ("Objective untuned", before),
-            ("Tuned", after),
+            (
+                "Sets",
+                Cell::number(tuning.map(|tuning| f64::from(tuning.sets)), 0),
+            ),
+            ("Objective untuned", objective(0)),
+            ("Tuned", objective(1)),
+            (
+                "Last moved by",
+                Cell::Text(said(tuning.map(|tuning| &tuning.moved))),
+            ),
             ("Parameters", Cell::Text(found)),
         ]
     };
     let caption = match results.budget {
-        0 => "Laws as they were judged".into(),
-        budget => format!(
-            "Laws as they were judged: the best of {budget} sets each, by the objective on the training drives"
-        ),
+        0 => "Laws as they were judged",
+        _ => {
+            "Laws as they were judged: tuned until two rounds of sets no longer lowered the objective on the training drives"
+        }
     };
     Table::of_rows(caption, results.laws.iter().map(row))
 }
@@ -157,7 +226,7 @@ fn laws(results: &CompareResults) -> Table {
 /// Every law in every world over the first law: the mean over the drivers, and who is worst off.
 fn ratios(results: &CompareResults) -> Table {
     let shown: Vec<usize> = (0..results.metrics.len())
-        .filter(|place| FIRST.contains(&results.metrics[*place].name))
+        .filter(|place| results.metrics[*place].is_judged)
         .collect();
     let pairs =
         (1..results.laws.len()).flat_map(|law| (0..results.worlds.len()).map(move |world| (law, world)));
@@ -165,9 +234,17 @@ fn ratios(results: &CompareResults) -> Table {
         let cell = |metric: &usize| {
             let is_it = |ratio: &&Ratio| (ratio.law, ratio.world, ratio.metric) == (law, world, *metric);
             let found = results.ratios.iter().find(is_it);
-            let largest = found.map(|ratio| (ratio.largest.0, &results.drivers[ratio.largest.1][0]));
-            let largest = largest.map_or(String::new(), |(share, name)| format!(" ({share:.3} {name})"));
-            Cell::Text(with_interval(found.map(|ratio| &ratio.mean)) + &largest)
+            let found = found.filter(|ratio| ratio.mean.interval.is_some());
+            let clear = found
+                .and_then(|ratio| ratio.p_holm)
+                .is_some_and(|p| is_clear(results, p));
+            let largest = found.filter(|ratio| ratio.largest.0.interval.is_some());
+            let largest = largest.map_or(String::new(), |ratio| {
+                format!(" ({} {})", results.drivers[ratio.largest.1][0], ratio.largest.0)
+            });
+            Cell::Text(
+                with_interval(found.map(|ratio| &ratio.mean)) + if clear { "*" } else { "" } + &largest,
+            )
         };
         let head = [&results.laws[law].name, &results.worlds[world]].map(Cell::text);
         head.into_iter().chain(shown.iter().map(cell)).collect()
@@ -175,10 +252,94 @@ fn ratios(results: &CompareResults) -> Table {
     let labels = shown.iter().map(|place| results.metrics[*place].label);
     let columns = ["Law", "World"].into_iter().chain(labels);
     let caption = format!(
-        "Means over drivers and places as shares of those of {}, with intervals over the seeds, and the largest share of a driver",
-        results.laws[0].name
+        "Over {}, means over {}; * clearly not 1. In brackets the driver who is worst off, with an interval over {} that counts how many \
+         drivers he was chosen from",
+        results.laws[0].name, results.units[1], results.units[0]
     );
     Table::new(caption, columns, pairs.map(row))
+}
+
+/// Whether a probability, corrected, is below what the level leaves.
+fn is_clear(results: &CompareResults, p: f64) -> bool {
+    p < 1.0 - results.level.share()
+}
+
+/// Conflict and effort over peak: each law's front, joined; laws with one set are points with their intervals.
+fn front_figure(results: &CompareResults) -> Figure {
+    let of_law = |law: usize| results.front.iter().filter(move |point| point.law == law);
+    let (fronts, single): (Vec<usize>, Vec<usize>) =
+        (0..results.laws.len()).partition(|law| of_law(*law).count() > 1);
+    let panel = |quantity: &str, traded: usize| {
+        let at = |ratios: [Mean; 3]| (ratios[0].mean, ratios[traded].mean);
+        let line = |(number, law): (usize, &usize)| {
+            let points = of_law(*law).filter_map(|point| point.ratios.map(at)).collect();
+            Series::dots(&results.laws[*law].name, number + 1, points).joined()
+        };
+        let alone = single
+            .iter()
+            .flat_map(|law| of_law(*law))
+            .filter_map(|point| point.ratios);
+        let ends = |ratios: [Mean; 3]| ratios[traded].interval.unwrap_or([ratios[traded].mean; 2]);
+        let (points, ends) = alone.map(|ratios| (at(ratios), ends(ratios))).unzip();
+        let alone = Series::with_mark("laws of one set", 0, Mark::Whiskers(ends), points);
+        Axis::new(quantity, "-").panel([alone].into_iter().chain(fronts.iter().enumerate().map(line)))
+    };
+    Axis::new("Peak lateral error", "-").figure([panel("Conflict", 2), panel("Effort", 1)])
+}
+
+fn front_caption(results: &CompareResults) -> String {
+    format!(
+        "What each law trades: driver torque against the guidance, and driver torque, over the peak lateral error; means over the drivers as \
+         shares of those of {}. Less of each is better. The points of laws with one set are told apart by the table.",
+        results.laws[0].name
+    )
+}
+
+fn front_table(results: &CompareResults) -> Table {
+    let row = |point: &FrontPoint| {
+        let value = |(name, value): &(&str, f64)| format!("{name} {}", rounded(*value));
+        let values: Vec<String> = point.values.iter().map(value).collect();
+        let ratio = |traded: usize| Cell::Text(said(point.ratios.as_ref().map(|ratios| &ratios[traded])));
+        let by = point.beaten_by.map(|(law, _)| &results.laws[law].name);
+        [
+            ("Law", Cell::text(&results.laws[point.law].name)),
+            ("Parameters", Cell::Text(values.join(", "))),
+            ("Judged", Cell::text(if point.is_judged { "yes" } else { "" })),
+            ("Peak", ratio(0)),
+            ("Effort", ratio(1)),
+            ("Conflict", ratio(2)),
+            ("Beaten by", Cell::text(by.map_or("", String::as_str))),
+        ]
+    };
+    let caption = format!(
+        "Sets of each law's front on the judged drives, over {}; beaten by: a set of this law has clearly less of all three",
+        results.laws[0].name
+    );
+    let others = results
+        .front
+        .iter()
+        .filter(|point| point.law > 0 || !point.is_judged);
+    Table::of_rows(caption, others.map(row))
+}
+
+fn front_judgement(results: &CompareResults) -> String {
+    let told = results.laws.iter().enumerate().skip(1).map(|(number, law)| {
+        let own = || results.front.iter().filter(|point| point.law == number);
+        let judged = own().filter(|point| point.ratios.is_some()).count();
+        let beaten = own().filter(|point| point.beaten_by.is_some()).count();
+        let left = own().count() - judged;
+        let left = if left > 0 {
+            format!(", {left} not judged: a drive left the road")
+        } else {
+            String::new()
+        };
+        format!("{}: {beaten} of {judged} beaten{left}", law.name)
+    });
+    let told: Vec<String> = told.collect();
+    format!(
+        "Sets that another law clearly beats in peak, effort and conflict together (corrected for all pairs of sets). {}.",
+        told.join("; ")
+    )
 }
 
 /// Four digits, which tell a set again.
@@ -202,7 +363,7 @@ fn has_values(results: &CompareResults, metric: usize) -> bool {
 fn matrix(results: &CompareResults, place: usize, metric: &Metric) -> Table {
     let of_law = |(number, law): (usize, &LawResult)| {
         let cells = results.cells.iter().filter(|pair| pair.law == number);
-        let values = cells.map(|pair| Cell::Text(with_interval(pair.values[place].as_ref())));
+        let values = cells.map(|pair| Cell::Text(said(pair.values[place].as_ref())));
         [Cell::text(&law.name)].into_iter().chain(values).collect()
     };
     let columns = ["Law"]
@@ -215,10 +376,11 @@ fn matrix(results: &CompareResults, place: usize, metric: &Metric) -> Table {
 fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
     let panel = |(number, [name, _]): (usize, &[String; 2])| {
         let cells = results.cells.iter().filter(|pair| pair.driver == number);
-        let found = cells.filter_map(|pair| Some((super::place(pair.law), pair.values[place]?)));
-        let (points, ends) = found
-            .map(|(x, value)| ((x, value.mean), value.interval.unwrap_or([value.mean; 2])))
-            .unzip();
+        let found = cells.filter_map(|pair| {
+            let value = pair.values[place]?;
+            Some(((super::place(pair.law), value.mean), value.interval?))
+        });
+        let (points, ends) = found.unzip();
         let series = Series::with_mark("", 0, Mark::Whiskers(ends), points);
         Panel::new(name, Axis::new(metric.label, metric.unit), [series])
     };
@@ -229,17 +391,21 @@ fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
     }
 }
 
-/// Differences to the first law whose interval does not hold zero: with + if the law is better there.
+/// Differences to the first law that are clear: with whether the law is better there.
 fn clear(results: &CompareResults) -> impl Iterator<Item = (&Pair, &Metric, Mean, bool)> {
-    let pairs = results.cells.iter().filter(|pair| pair.law > 0);
-    pairs.flat_map(|pair| {
-        let metrics = results.metrics.iter().zip(&pair.against_first);
-        let metrics = metrics.filter(|(metric, _)| FIRST.contains(&metric.name));
-        metrics.filter_map(move |(metric, difference)| {
-            let difference = (*difference)?;
-            let [low, high] = difference.interval?;
-            let is_less = high < 0.0;
-            (is_less || low > 0.0).then_some((pair, metric, difference, is_less != metric.more_is_better))
+    results.cells.iter().flat_map(move |pair| {
+        let metrics = results
+            .metrics
+            .iter()
+            .zip(pair.against_first.iter().zip(&pair.p_holm));
+        metrics.filter_map(move |(metric, (difference, p))| {
+            let difference = difference.filter(|_| p.is_some_and(|p| is_clear(results, p)))?;
+            Some((
+                pair,
+                metric,
+                difference,
+                (difference.mean < 0.0) != metric.more_is_better,
+            ))
         })
     })
 }
@@ -256,8 +422,11 @@ fn judgement(results: &CompareResults) -> String {
         return "There is no other law.".into();
     }
     format!(
-        "Clear differences (the interval over the seeds, drive by drive, does not hold zero) in peak error, effort, torque in conflict and the \
-         worst peak after a loss, over the drivers. {}.",
+        "Clear differences in peak error, effort, torque in conflict and the worst peak after a loss, driver by driver: Student's test of pairs \
+         over {} {}, {} % after Holm's correction for all laws, drivers and these metrics. {}.",
+        results.draws,
+        results.units[0],
+        results.level,
         told.join("; ")
     )
 }

@@ -26,7 +26,6 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
         Block::Text(format!(
             "Effort and conflict are those of {whose}. Loss x and Others x: how many times as far as its bars allow the search let a set go."
         )),
-        Block::Text(what_holds(results, choice)),
     ];
     let row = vec![
         Block::Table(bars(results, choice)),
@@ -37,7 +36,8 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
         Section::new(format!("Row {}", chosen + 1), row),
     ];
     let title = format!("Guidance for its drivers: {}", results.name);
-    Report::new(title, summary(results), sections)
+    let summary = format!("{} {}", what_holds(results, choice), summary(results));
+    Report::new(title, summary, sections)
 }
 
 /// Whether a set that was tried holds all bars, and which bars the chosen row misses on the held-out drives.
@@ -61,7 +61,7 @@ fn what_holds(results: &DesignResults, choice: &Choice) -> String {
     } else {
         format!("misses {}", missed.join(", "))
     };
-    format!("{search}. On the held-out drives the chosen row {chosen}.")
+    format!("On the held-out drives the chosen row {chosen}. {search}.")
 }
 
 /// A scenario file with the gains of a row.
