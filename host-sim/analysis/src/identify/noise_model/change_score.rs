@@ -67,6 +67,15 @@ pub(super) struct Freed {
     along: Local,
     /// All that changes: the change and the offset of T_d beside it.
     changes: Local,
+    /// What the driver's parameters change by before it, from what they are throughout.
+    before: Local,
+}
+
+impl Freed {
+    /// What a parameter of the driver changes by before the change and after it, from what it is throughout.
+    pub(super) fn sides_of(&self, i: usize) -> [f64; 2] {
+        [self.before[i], self.before[i] + self.changes[i]]
+    }
 }
 
 impl Block {
@@ -144,12 +153,15 @@ impl Fitted {
         let along = direction - beside * left.row(OFFSET).transpose().dot(direction);
         let information = along.dot(&(left * along));
         let by = score.dot(&along) / information;
+        let changes = along * by + beside * score[OFFSET];
+        let before = |i: usize| if i < OFFSET { -taken.row(i).transpose().dot(&changes) } else { 0.0 };
         (information > 1e-6 * direction.dot(&(sum.square * direction))).then(|| Freed {
             by,
             information,
             deviance: by * by * information / self.variance,
             along,
-            changes: along * by + beside * score[OFFSET],
+            changes,
+            before: Local::from_fn(|i, _| before(i)),
         })
     }
 

@@ -42,8 +42,8 @@ const DELAY_SLACK_S: f64 = 0.05;
 fn hold_possible<T>(t_p_s: f64, tried: &mut [(T, Freed)]) {
     let room_s = |by: f64| DELAY_SLACK_S + if by > 0.0 { LONGEST_DELAY_S - t_p_s } else { t_p_s };
     for (_, freed) in tried {
-        let share = |side: DVector<f64>| (room_s(side[T_P]) / side[T_P].abs()).min(1.0);
-        let share = freed.sides().map(share).into_iter().fold(1.0, f64::min);
+        let share = |by: f64| (room_s(by) / by.abs()).min(1.0);
+        let share = freed.sides_of(T_P).map(share).into_iter().fold(1.0, f64::min);
         freed.deviance *= share * (2.0 - share);
     }
 }
