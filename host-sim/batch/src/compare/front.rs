@@ -1,7 +1,7 @@
 //! What a law trades: peak, effort and conflict of the sets of its front, over those of the first law, on the judged drives. The judgement is
 //! of the fronts, so that no law wins by where its tuning landed.
 
-use haptic_analysis::identify::holm;
+use crate::several::holm;
 use serde::Serialize;
 
 use super::tune::Tuned;

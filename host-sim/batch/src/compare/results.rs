@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use haptic_analysis::identify::holm;
+use crate::several::holm;
 
 use super::tune::Tuned;
 use super::{Compare, Driven, Faults, FrontPoint, METRICS, Mean, Metric, TunedBy, Unit, by_unit, mean_of};

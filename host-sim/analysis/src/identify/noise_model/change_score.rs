@@ -154,7 +154,13 @@ impl Fitted {
         let information = along.dot(&(left * along));
         let by = score.dot(&along) / information;
         let changes = along * by + beside * score[OFFSET];
-        let before = |i: usize| if i < OFFSET { -taken.row(i).transpose().dot(&changes) } else { 0.0 };
+        let before = |i: usize| {
+            if i < OFFSET {
+                -taken.row(i).transpose().dot(&changes)
+            } else {
+                0.0
+            }
+        };
         (information > 1e-6 * direction.dot(&(sum.square * direction))).then(|| Freed {
             by,
             information,
