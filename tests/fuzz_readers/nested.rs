@@ -1,7 +1,7 @@
 //! What is nested deeper than a stack is high: refused or read, and the process lives.
 
 use haptic_log::formats::{BusLog, Format, Reading, read_bytes};
-use haptic_log::notes::Notes;
+use haptic_log::notes::{Fate, Notes};
 use haptic_sim::models::road::{Course, LaneChoice};
 
 use crate::seeds;
@@ -27,17 +27,23 @@ fn a_scenario_is_nested() {
     assert!(Course::from_toml("nested", &text).is_err());
 }
 
+/// The signal that it is in is left out, and said; its neighbour is read.
 #[test]
 fn a_dbc_file_is_nested() {
     let text = seeds::SMALL_DBC.replace("(0.001,", &"(".repeat(DEEP));
+    let log = BusLog::of_frames(seeds::frames(4), Notes::default());
+    let found = haptic_log::formats::dbc::channels(&log, text.as_bytes(), None).unwrap();
+    let channels: Vec<&str> = found
+        .groups
+        .iter()
+        .flat_map(|group| &group.channels)
+        .map(|channel| channel.name.as_str())
+        .collect();
     assert!(
-        haptic_log::formats::dbc::channels(
-            &BusLog::of_frames(seeds::frames(4), Notes::default()),
-            text.as_bytes(),
-            None
-        )
-        .is_err()
+        channels.contains(&"Heading") && !channels.contains(&"Offset"),
+        "{channels:?}"
     );
+    assert!(found.notes.iter().any(|note| note.fate == Fate::LeftOut));
 }
 
 /// Lists of data blocks, each with one link, to the next list.

@@ -138,7 +138,7 @@ enum Command {
     ///
     /// CSV, Parquet, MAT, MDF4, candump, ASC, BLF.
     Convert(convert::Arguments),
-    /// The ECU itself and its bus: run, pil, live, parameters, diag, bus
+    /// The ECU and its bus: run, pil, live, parameters, diag, bus
     ///
     /// In QEMU or on a board.
     #[command(subcommand)]

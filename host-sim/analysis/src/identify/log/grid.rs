@@ -22,7 +22,7 @@ const LONGEST_STEP: f64 = 3.5;
 /// Stamps that come in pairs, nearly at once, make no grid finer than this share of the usual step.
 const LEAST_STEP: f64 = 0.5;
 
-/// Share of the grid below which what is read off between rows does not count.
+/// Share of the grid below which it does not count that lost rows are bridged.
 const FEW: f64 = 0.15;
 
 /// Values on the grid that are so many apart share no row.
@@ -134,7 +134,7 @@ impl Grid {
     }
 
     /// Autocorrelation, from lag 1 on, that reading off between rows gives to noise that is white from row to row; empty
-    /// where nearly all rows are taken as they are.
+    /// where all rows, or nearly all beside a few lost ones, are taken as they are.
     pub(super) fn autocorrelation(&self, time: &[f64]) -> Vec<f64> {
         let (longest, is_cubic) = match &self.place {
             Place::Between(longest) => (*longest, true),
@@ -152,7 +152,7 @@ impl Grid {
         let read_off = weights
             .iter()
             .filter(|w| w.weight.iter().all(|w| *w < 1.0 - TIME_STAMP_TOLERANCE));
-        if (read_off.count() as f64) < FEW * weights.len() as f64 {
+        if !is_cubic && (read_off.count() as f64) < FEW * weights.len() as f64 {
             return Vec::new();
         }
         let at = |lag: usize| -> f64 {
