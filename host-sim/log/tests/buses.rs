@@ -452,25 +452,23 @@ fn a_dbc_file_without_a_message_is_refused_with_its_line() {
     }
 }
 
+/// Three frames, read by a DBC file of six lines and what follows.
+fn beside_two_messages(body: &str) -> Recording {
+    let begin = "\u{feff}VERSION \"\"\nNS_ :\n\tCM_\n\tBO_TX_BU_\nBS_:\nBU_: A\n";
+    let text = "(0.0) can0 025#6432\n(0.1) can0 026#64\n(0.2) can0 025#6432\n";
+    let dbc_text = format!("{begin}{body}");
+    dbc::channels(&log("x.log", text.into()), dbc_text.as_bytes(), None).unwrap()
+}
+
 /// What is wrong in a DBC file takes no other message along: a byte of 0x64 is 100 for those that are left.
 #[test]
 fn a_statement_that_is_not_understood_takes_nothing_else_along() {
-    let begin = "\u{feff}VERSION \"\"\nNS_ :\n\tCM_\n\tBO_TX_BU_\nBS_:\nBU_: A\n";
     let signals = " SG_ V : 0|8@1+ (1,0) [0|0] \"\" A\n SG_ W : 8|8@1+ (1,0) [0|0] \"\" A\n";
     let (first, second) = (
         format!("BO_ 37 M: 8 A\n{signals}"),
         "BO_ 38 N: 8 A\n SG_ X : 0|8@1+ (1,0) [0|0] \"\" A\n",
     );
-    let read = |body: &str| {
-        let text = "(0.0) can0 025#6432\n(0.1) can0 026#64\n(0.2) can0 025#6432\n";
-        dbc::channels(
-            &log("x.log", text.into()),
-            format!("{begin}{body}").as_bytes(),
-            None,
-        )
-        .unwrap()
-    };
-    let whole = read(&format!("{first}{second}"));
+    let whole = beside_two_messages(&format!("{first}{second}"));
     assert!(whole.notes.is_empty());
     assert_eq!(values(&whole, "V"), [100.0, 100.0]);
     let not = "the DBC file's text is not understood";
@@ -533,7 +531,7 @@ fn a_statement_that_is_not_understood_takes_nothing_else_along() {
             is[1],
         ),
     ] {
-        let found = read(&body);
+        let found = beside_two_messages(&body);
         assert!(notes(&found).contains(&said), "{body}: {:?}", notes(&found));
         for (name, is_left) in ["V", "W", "X"].into_iter().zip(left) {
             assert_eq!(found.find(name).is_ok(), is_left, "{body}: {name}");

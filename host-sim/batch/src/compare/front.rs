@@ -48,7 +48,7 @@ pub(super) fn fronts(
     let each = judged.len() / compare.laws.len();
     let laws = (0..compare.laws.len()).map(|law| (law, &tuned[law].values[0], true));
     let others = sets.iter().map(|set| (set.law, &set.values, false));
-    let mut found: Vec<((usize, &Vec<f64>, bool), &[Driven])> = laws
+    let mut found: Vec<(Shown, &[Driven])> = laws
         .chain(others)
         .zip(judged.chunks(each).chain(driven.chunks(each)))
         .collect();
@@ -87,6 +87,9 @@ pub(super) fn fronts(
     points.sort_by(|a, b| (a.law.cmp(&b.law)).then(peak(a).total_cmp(&peak(b))));
     Ok(points)
 }
+
+/// A law, its values, and whether they are those that are judged.
+type Shown<'a> = (usize, &'a Vec<f64>, bool);
 
 /// Peak, effort and conflict of each unit; none if a drive left the road. A drive without guidance has no conflict.
 fn figures(compare: &Compare, driven: &[Driven]) -> Option<Ratios> {
