@@ -2,7 +2,7 @@
 //!
 //! Every instruction counts one, even if a condition skips it. At a branch the longer of both ways counts, whether or
 //! not any state takes it. A call counts as the longest path of the called function. A loop counts as many times as
-//! [`LOOPS`] allows for the function of the source that has it, which the lines of debugging name; any other loop is an error.
+//! [`LOOPS`] allows for the function of the source that has it, which the image's debug information names; any other loop is an error.
 //! Memory that is cleared or copied counts by its number of bytes, which has to be a constant. So the bound may be far
 //! above the real maximum, but never below it.
 //!
@@ -116,7 +116,8 @@ struct Instruction {
     operands: String,
 }
 
-/// How often a loop runs at most that clears or copies.
+/// How often a loop runs at most that clears or copies. `widest` has the bytes that the widest loop so far stores in a round: a
+/// narrower one has less than that left.
 fn rounds_of_memory(members: &[&Instruction], bytes: u64, widest: &Cell<u64>) -> Result<u64> {
     let stride = members.iter().map(|at| at.bytes_stored()).sum();
     ensure!(stride > 0, "a loop that stores nothing");

@@ -20,7 +20,7 @@
 //! Angle I32F32 rad, rate I0F32 rad/ms, torque I8F24 N.m. Beside the same equations in f64 the estimate is off by at most 6 mN.m
 //! (`tests/oracle.rs`), for bandwidths of 10 to 300 rad/s. A step has 9 products of 32 bits, no division and no loop.
 //!
-//! Not here: who asks for the estimate. The ECU does not use it yet; how good it is with which sensor prints `host-sim driver-torque`.
+//! Not here: who asks for the estimate. The ECU does not use it yet; `host-sim driver-torque` prints how good it is with each sensor.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::{ColumnFile, rms};
 use crate::{Assist, ColumnError, Plant};
 
-/// Steps of the angle's sensor, degrees, and its rates, Hz.
+/// Steps of the angle's sensor, degrees.
 pub const STEPS_DEG: [f64; 3] = [0.005, 0.02, 0.1];
 /// Rates of the angle's sensor.
 pub const RATES: [Rate; 2] = [Rate::EveryStep, Rate::Camera];

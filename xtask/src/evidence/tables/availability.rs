@@ -16,7 +16,9 @@ pub(super) fn availability(columns: &Columns, is_shown: impl Fn(&Cell) -> bool) 
             );
             continue;
         };
-        let shown = kept.cells().iter().filter(|cell| is_shown(cell));
+        // A world that is not judged has no sum over its roads: each of them is shown.
+        let none_is_shown = !kept.cells().iter().any(&is_shown);
+        let shown = kept.cells().iter().filter(|cell| none_is_shown || is_shown(cell));
         rows.extend(shown.map(|cell| availability_row(title, cell)));
     }
     let head = [

@@ -248,4 +248,17 @@ fn a_world_has_a_line_with_its_bound() {
         "| `events` | all | 103.58 | 3 (LaneStep 3 times) | 0.0749 | 0 | 9 |"
     );
     assert_eq!(lines[3], "");
+    // Without a sum each road has its line.
+    let text = [
+        head.into(),
+        cell("country", 0, "null"),
+        cell("motorway", 3, "null"),
+    ]
+    .join("\n");
+    let kept = vec![("events", Kept::parse(&text).unwrap())];
+    let lines = table(r#""availability""#, r#"["events"]"#, kept);
+    assert!(
+        lines[2].contains("country") && lines[3].contains("motorway"),
+        "{lines:?}"
+    );
 }
