@@ -4,8 +4,8 @@
 //! assumptions hold, or what is beside them is what the program says that it takes care of. With any other something is wrong:
 //! a sensor, the file, or the driver is not one.
 //!
-//! What no log can tell, and every result lists as assumed, is not here: a scale of both lane signals, an e_y that drifts, a
-//! camera that is late, an offset of e_y (the driver's own line).
+//! Four things that no log can tell are not here: a scale of both lane signals, an e_y that drifts, a camera that is late, an
+//! offset of e_y (the driver's own line). Others that a result lists as assumed are drawn, such as torques that cannot be weighed.
 
 use haptic_sim::models::nonlinear::Tyres;
 use rand::RngExt;
