@@ -47,10 +47,9 @@ pub use paper::{TABLE_4, identify as identify_as_published};
 pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use recording::{Layout, Mapping, Signals, Table, of_bytes, of_table, open as open_mapped};
-pub use result::Refutation;
 pub use result::{
     AtTNms, Combination, Correlation, Identification, InputCorrelation, OwnLine, Parameter, Parameters,
-    Remnant, Start, Traces, Whiteness,
+    Refutation, Remnant, Start, Torques, Traces, Whiteness,
 };
 pub use search::Termination;
 pub use signals::Muscle;

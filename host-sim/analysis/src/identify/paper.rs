@@ -229,6 +229,7 @@ impl<'a> Problem<'a> {
             input_correlation,
             preflight: None,
             balance: None,
+            torques: None,
             constancy: None,
             delay_profile: Vec::new(),
             refuted: Vec::new(),

@@ -35,6 +35,16 @@ pub struct Refutation {
     pub cure: String,
 }
 
+/// Whether scale and sign of the driver's torque against the guidance's were checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Torques {
+    /// By their balance on the column.
+    Weighed,
+    /// Not at all: gusts, friction, an assist or coarse signals hide it. What is identified holds if they are right.
+    AsRecorded,
+}
+
 /// The assumption that a driver who changed refutes.
 pub(crate) const SAME_DRIVER: &str = "the driver is the same throughout";
 /// The assumption that a line refutes that moves.
@@ -390,6 +400,8 @@ pub struct Identification {
     pub preflight: Option<Preflight>,
     /// The torques on the column against its motion.
     pub balance: Option<Balance>,
+    /// What that says of how the torques of a guided drive were recorded; none of a drive by hand, in which nothing tells a scale.
+    pub torques: Option<Torques>,
     /// Whether the driver was the same throughout; none for the published method, which does not ask.
     pub constancy: Option<Constancy>,
     /// The loss over t_p with all else at its best, as minus twice the log likelihood above the optimum.

@@ -7,15 +7,12 @@
 
 use super::balance::Balance;
 use super::change::{Change, E_Y, SHORTEST_S, T_D};
-use super::result::{InputCorrelation, Parameter, Refutation, SAME_DRIVER, SAME_LINE, Whiteness};
+use super::result::{InputCorrelation, Parameter, Refutation, SAME_DRIVER, SAME_LINE, Torques, Whiteness};
 
 /// Standard errors beyond which a difference is certain, with all the tests that are made of one record.
 pub(crate) const CERTAIN: f64 = 5.0;
 /// Explained share of T_d above which the column's balance of torques is seen to hold.
 pub(crate) const BALANCE_SEEN: f64 = 0.8;
-/// The share above which it tells scales and instants too: gusts of 250 N leave 87 % and make a scale of 0.2 of a right one, a motor's
-/// ripple of 0.06 N.m leaves 98.8 % and makes one of 0.78, and without them it is more than 99.5 %.
-pub(crate) const BALANCE_CLOSE: f64 = 0.99;
 /// Differences of scale and of delay, s, that are too small to matter.
 const SMALL_SCALE: f64 = 0.1;
 /// How far a scale may be off beside so much dry friction, N.m, and more, and in proportion beside less: with 0.5 N.m that gives way over
@@ -51,10 +48,10 @@ pub(crate) fn of_balance(b: &Balance, assisted: bool) -> Vec<Refutation> {
     if b.explained < BALANCE_SEEN {
         return Vec::new();
     }
-    let is_told = |r: &Refutation| r.assumption == SIGNS || b.explained >= BALANCE_CLOSE;
+    let is_told = |r: &Refutation| r.assumption == SIGNS || b.is_close();
     let signs_and_scale = of_signs_and_scale(b, assisted).into_iter().filter(is_told);
-    // Before it slides, friction gives way like a spring: that looks like a delay.
-    let instants = if b.friction_nm.is_some() || b.explained < BALANCE_CLOSE {
+    // Before it slides, friction gives way like a spring: that looks like a delay. So does an assist, which acts with T_d and is late.
+    let instants = if b.friction_nm.is_some() || assisted || !b.is_close() {
         Vec::new()
     } else {
         of_instants(b)
@@ -74,16 +71,31 @@ fn balance_evidence(b: &Balance, what: &str) -> String {
     )
 }
 
-/// A channel with a swapped sign or another scale; at most one, in the order of precedence.
-fn of_signs_and_scale(b: &Balance, assisted: bool) -> Option<Refutation> {
-    let small = match b.friction_nm {
+/// How far a scale has to be off to be told.
+fn least_scale(b: &Balance) -> f64 {
+    match b.friction_nm {
         Some([friction_nm, _]) => {
             // No more than that much friction is known to bias.
             let share = (friction_nm / MUCH_FRICTION_NM).clamp(0.0, 1.0);
             SMALL_SCALE + share * (SMALL_SCALE_BESIDE_FRICTION - SMALL_SCALE)
         }
         None => SMALL_SCALE.max(LEEWAY * b.scale_leeway),
-    };
+    }
+}
+
+/// Whether a balance tells the scale of one torque against the other to what counts as right.
+pub(crate) fn torques(b: Option<&Balance>, assisted: bool) -> Torques {
+    let tells = |b: &Balance| b.scale.is_some() && b.is_close() && least_scale(b) <= SMALL_SCALE;
+    if !assisted && b.is_some_and(tells) {
+        Torques::Weighed
+    } else {
+        Torques::AsRecorded
+    }
+}
+
+/// A channel with a swapped sign or another scale; at most one, in the order of precedence.
+fn of_signs_and_scale(b: &Balance, assisted: bool) -> Option<Refutation> {
+    let small = least_scale(b);
     let negative = b.stiffness[0] < 0.0 && is_sure(b.stiffness[0], b.stiffness[1]);
     let sign = |cause: &str, cure: &str, what: String| Refutation {
         assumption: SIGNS,
@@ -92,7 +104,8 @@ fn of_signs_and_scale(b: &Balance, assisted: bool) -> Option<Refutation> {
         cure: cure.to_owned(),
     };
     Some(match b.scale {
-        Some([s, e]) if s < 0.0 && is_sure(s, e) && s < -SMALL_SCALE => {
+        // What is left unexplained may make a small negative scale of a right one.
+        Some([s, e]) if is_sure(s, e) && s < -SMALL_SCALE && 1.0 - s > b.scale_leeway => {
             if negative {
                 sign(
                     "the sign of driver_torque_nm is swapped",
@@ -319,7 +332,7 @@ pub(crate) fn of_changed_sensor(
     record: [f64; 2],
     [before, after]: [&Balance; 2],
 ) -> Option<Refutation> {
-    if before.explained.min(after.explained) < BALANCE_SEEN {
+    if !before.is_close() || !after.is_close() {
         return None;
     }
     let moved = |[was, error_was]: [f64; 2], [is, error]: [f64; 2]| {
@@ -379,7 +392,7 @@ mod tests {
         }
     }
 
-    /// A scale of 0.8 in a calm balance is told, but beside an assist, which makes one; a scale of 1.2 is told with an assist too. Of a
+    /// A scale of 0.8 in a calm balance is told, but beside an assist, which makes one, and a delay of 8 ms too, which an assist makes too; a scale of 1.2 is told with an assist too. Of a
     /// balance that explains 90 % a swapped sign is told, and neither scale nor delay; a delay of 8 ms is within what steps of 0.2
     /// degrees leave open.
     #[test]
@@ -398,7 +411,7 @@ mod tests {
                 told(balance(0.995, 0.8, 0.1), false),
                 told(balance(0.995, 0.8, 0.1), true)
             ],
-            [2, 1]
+            [2, 0]
         );
         assert_eq!(
             [
@@ -437,6 +450,35 @@ mod tests {
         assert_eq!([-0.008, 0.008].map(|s| told(1.0, s, [0.02, 0.01])), [0, 0]);
         assert_eq!([-0.012, 0.012].map(|s| told(1.0, s, [0.02, 0.01])), [1, 1]);
         assert_eq!([-0.012, 0.012].map(|s| told(1.0, s, [0.02, 0.02])), [0, 0]);
+    }
+
+    /// A sign is swapped where no right scale of 1 could look so: with a leeway of 1.15 -0.12 tells none, and -0.2 does. Scales are
+    /// weighed to 10 %: not in gusts, beside an assist, where rows are sparse or where the leeway is more than a fifth.
+    #[test]
+    fn a_scale_is_told_from_what_a_right_one_may_look_like() {
+        let b = |scale: f64, scale_leeway| Balance {
+            explained: 0.995,
+            scale: Some([scale, 0.01]),
+            stiffness: [3.0, 0.1],
+            scale_leeway,
+            ..Balance::default()
+        };
+        let is_sign = |b: Balance| of_balance(&b, false).iter().any(|r| r.assumption == SIGNS);
+        assert!(!is_sign(b(-0.12, 1.15)) && is_sign(b(-0.2, 1.15)) && is_sign(b(-1.0, 0.1)));
+        let weighed = |b: Balance, assisted| torques(Some(&b), assisted) == Torques::Weighed;
+        assert!(weighed(b(1.0, 0.19), false));
+        assert!(!weighed(b(1.0, 0.21), false) && !weighed(b(1.0, 0.1), true));
+        let gusts = Balance {
+            explained: 0.985,
+            ..b(1.0, 0.1)
+        };
+        let sparse = Balance {
+            is_sparse: true,
+            ..b(1.0, 0.1)
+        };
+        assert!(
+            !weighed(gusts, false) && !weighed(sparse, false) && torques(None, false) == Torques::AsRecorded
+        );
     }
 
     /// Of a record of 200 s, a part of 10 s at least can be fitted.

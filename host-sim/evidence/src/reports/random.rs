@@ -24,7 +24,7 @@ pub(super) fn summary(found: &RandomDrives) -> String {
     } = found;
     format!(
         "Seed {}, probe {} N.m: {} drives, and {} more in which the car left its lane, which tell nothing. Wrong of the identified values: \
-         {}; in honest drives {}, in the others {}. Honest logs that are accused: {}; logs in which something is wrong that are refuted: \
+         {}; in honest drives {}, in the others {}; of those that are identified if the torques are right {}. Honest logs that are accused: {}; logs in which something is wrong that are refuted: \
          {}. The 95 % intervals of honest drives hold the truth in {}.",
         plan.seed,
         plan.probe_nm,
@@ -33,6 +33,7 @@ pub(super) fn summary(found: &RandomDrives) -> String {
         in_words(all.wrong),
         in_words(honest.wrong),
         in_words(wrong.wrong),
+        in_words(all.wrong_if_right),
         in_words(honest.refuted),
         in_words(wrong.refuted),
         in_words(honest.held),
@@ -52,6 +53,8 @@ pub(super) fn tables(found: &RandomDrives) -> Vec<Table> {
             ("Identified", Cell::count(tally.wrong.of)),
             ("Wrong", Cell::count(tally.wrong.count)),
             ("at most (%)", Cell::number(upper, 2)),
+            ("If right", Cell::count(tally.wrong_if_right.of)),
+            ("Wrong of them", Cell::count(tally.wrong_if_right.count)),
             ("Held by 95 %", Cell::count(tally.held.count)),
         ]
     };
@@ -69,7 +72,7 @@ pub(super) fn tables(found: &RandomDrives) -> Vec<Table> {
     let mut tables = vec![Table::of_rows(
         "Each condition among whatever was beside it: an honest one in honest drives, a wrong one in the others. Wrong: called \
          identified, and more than 4 standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off; at most: the upper end of the \
-         95 % interval. Refuted honest logs are accused.",
+         95 % interval. If right: identified if the torques are, which this log does not tell. Refuted honest logs are accused.",
         found.lines.iter().map(row),
     )];
     if !found.wrong_values.is_empty() {

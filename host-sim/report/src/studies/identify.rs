@@ -5,7 +5,7 @@ use super::{pieces, place};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
 use haptic_analysis::identify::{
-    Combination, History, Identification, InputCorrelation, LeftOut, Parameter, Reason, Refutation,
+    Combination, History, Identification, InputCorrelation, LeftOut, Parameter, Reason, Refutation, Torques,
     autocorrelation,
 };
 use haptic_batch::identify::IdentifiedDrive;
@@ -447,6 +447,9 @@ fn parameters(found: &Identification) -> Table {
             (true, ..) => "given",
             _ if published => published_verdict(found, p),
             (_, true, true) => "identified, on a bound",
+            (_, true, false) if found.torques == Some(Torques::AsRecorded) => {
+                "identified, if torques are right"
+            }
             (_, true, false) => "identified",
             (_, false, true) => "not identified, on a bound",
             (_, false, false) => "not identified",

@@ -27,9 +27,9 @@ use crate::identify::result::Refutation;
 use crate::identify::search::covariance;
 use crate::identify::verdict;
 
-/// How much a change has to add to twice the log likelihood to be declared. At most two in a hundred constant drivers
-/// are then declared changed.
-const LEVEL: f64 = 16.0;
+/// How much a change has to add to twice the log likelihood to be declared: at most two in a hundred constant drivers are then
+/// declared changed, whatever else their logs have.
+const LEVEL: f64 = 20.0;
 /// The level of a change that goes back: it has a length besides, and more of them are tried.
 const BLIP_LEVEL: f64 = 24.0;
 /// Above this value a change is not declared yet, but widens the errors of the estimates.
@@ -179,7 +179,7 @@ impl Problem<'_> {
         else {
             return false;
         };
-        let is_weighed = sides.iter().all(|b| b.explained >= verdict::BALANCE_CLOSE);
+        let is_weighed = sides.iter().all(Balance::is_close);
         let [[was, error_was], [is, error]] = sides.map(|b| b.offset_nm);
         let (moved, said) = ((is - was) * change.by.signum(), change.by.abs());
         is_weighed && moved < 0.5 * said && said - moved > verdict::CERTAIN * error.hypot(error_was)

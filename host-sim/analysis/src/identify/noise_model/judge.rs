@@ -509,9 +509,8 @@ fn power_of(found: &Identification) -> Vec<String> {
         Some(b) if b.explained < verdict::BALANCE_SEEN => {
             Some("the column does not answer as one with a wheel alone, or hardly slides")
         }
-        Some(b) if b.explained < verdict::BALANCE_CLOSE => {
-            Some("beyond their signs: gusts or the road turn the wheel too")
-        }
+        Some(b) if b.is_sparse => Some("beyond their signs: rows are uneven and far apart"),
+        Some(b) if !b.is_close() => Some("beyond their signs: gusts or the road turn the wheel too"),
         Some(_) => None,
     };
     if found.balance.as_ref().is_some_and(|b| b.friction_nm.is_some()) {

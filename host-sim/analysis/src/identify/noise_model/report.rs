@@ -24,6 +24,7 @@ use crate::identify::result::{
     Start, Traces,
 };
 use crate::identify::search::{Bounds, Optimum};
+use crate::identify::verdict;
 
 /// Place of K_d in table 4.
 const TABLE_4_K_D: usize = 4;
@@ -80,6 +81,7 @@ impl Problem<'_> {
             whiteness: diagnostics::whiteness(&traces.residual_nm, 2),
             input_correlation: self.input_correlation(log, p, &traces),
             preflight: Some(prepared.preflight.clone()),
+            torques: (!options.manual).then(|| verdict::torques(balance.as_ref(), options.assisted)),
             balance,
             constancy: found.constancy.clone(),
             delay_profile: found.delay_profile.clone(),

@@ -12,7 +12,7 @@ mod draft;
 mod rows;
 mod summary;
 
-use haptic_analysis::identify::{Identification, Options, Parameter, identify_with_noise_model};
+use haptic_analysis::identify::{Identification, Options, Parameter, Torques, identify_with_noise_model};
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Part, Plan, Resumed, Store, Study};
 use haptic_batch::experiment::{ExperimentPlan, REMNANT_GUIDED_NM, chosen};
@@ -72,6 +72,8 @@ pub struct RandomDrive {
     pub lost: bool,
     /// What the model is refuted for, or why the log is not read; the cause behind the assumption.
     pub refuted: Vec<String>,
+    /// Whether the torques of its log could be weighed: else its values are identified if the torques are right.
+    pub weighed: bool,
     /// Values that are called identified.
     pub identified: Vec<RandomValue>,
 }
@@ -184,6 +186,7 @@ impl RandomPlan {
             conditions,
             lost,
             refuted: Vec::new(),
+            weighed: false,
             identified: Vec::new(),
         };
         if !lost {
@@ -219,6 +222,7 @@ impl RandomDrive {
             .iter()
             .map(|r| format!("{}: {}", r.assumption, r.cause))
             .collect();
+        self.weighed = found.torques == Some(Torques::Weighed);
         let truths = draft.ends().map(|end| draft.truth(&end));
         self.identified = identified(&found)
             .into_iter()

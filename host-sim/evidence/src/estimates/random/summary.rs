@@ -41,7 +41,9 @@ pub struct Tally {
     pub refuted: Share,
     /// Wrong ones of the values that are called identified.
     pub wrong: Share,
-    /// Values that are called identified whose 95 % interval holds the truth.
+    /// Wrong ones of the values that are called identified if the torques are right.
+    pub wrong_if_right: Share,
+    /// Values of both that have an estimate whose 95 % interval holds the truth.
     pub held: Share,
 }
 
@@ -50,13 +52,20 @@ impl Tally {
         let there = drives.clone().filter(|d| !d.lost);
         let values = there.clone().flat_map(|d| &d.identified);
         let count = there.clone().count();
-        let identified = values.clone().count();
+        let wrong = |weighed: bool| {
+            let values = there
+                .clone()
+                .filter(move |d| d.weighed == weighed)
+                .flat_map(|d| &d.identified);
+            Share::new(values.clone().filter(|v| v.wrong).count(), values.count())
+        };
         Self {
             drives: count,
             lost: drives.count() - count,
-            refuted: Share::new(there.filter(|d| !d.refuted.is_empty()).count(), count),
-            wrong: Share::new(values.clone().filter(|v| v.wrong).count(), identified),
-            held: Share::new(values.filter(|v| v.held).count(), identified),
+            refuted: Share::new(there.clone().filter(|d| !d.refuted.is_empty()).count(), count),
+            wrong: wrong(true),
+            wrong_if_right: wrong(false),
+            held: Share::new(values.clone().filter(|v| v.held).count(), values.count()),
         }
     }
 }
@@ -138,8 +147,10 @@ impl RandomDrives {
                 said(
                     d,
                     format!(
-                        "{} {estimate:.4} +- {error:.4}, truth {:.4}",
-                        v.parameter, v.truth
+                        "{} {estimate:.4} +- {error:.4}, truth {:.4}{}",
+                        v.parameter,
+                        v.truth,
+                        if d.weighed { "" } else { " (if torques are right)" }
                     ),
                 )
             })
