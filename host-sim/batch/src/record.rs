@@ -6,7 +6,7 @@ use super::Away;
 use crate::error::{StudyError, refuse};
 use haptic_core::controller::params::Params;
 use haptic_log::trace::Sample;
-use haptic_metrics::{self as metrics, Circumstances, Metrics, Window};
+use haptic_metrics::{self as metrics, Asked, Circumstances, Metrics, Window};
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
@@ -39,6 +39,17 @@ pub struct RunRecord {
 impl RunRecord {
     /// Measures a run over a window. `nominal_peak_m` is the peak of the same run without its failure.
     pub fn new(scenario: &Scenario, run: &Run, window: Window, nominal_peak_m: Option<f64>) -> Self {
+        Self::asked(scenario, run, window, nominal_peak_m, Asked::ALL)
+    }
+
+    /// Measures of a run what is asked for.
+    pub(super) fn asked(
+        scenario: &Scenario,
+        run: &Run,
+        window: Window,
+        nominal_peak_m: Option<f64>,
+        asked: Asked,
+    ) -> Self {
         let failure = scenario.failure().at_s().map(|time_s| metrics::Failure {
             time_s,
             nominal_peak_lateral_error_m: nominal_peak_m,
@@ -63,7 +74,7 @@ impl RunRecord {
             diverged: run.diverged(),
             end_m: run.trace.samples.last().map_or(0.0, |sample| sample.s_m),
             away: Away::new(scenario, &run.trace),
-            metrics: metrics::measure(&run.trace, &circumstances),
+            metrics: metrics::measure_asked(&run.trace, &circumstances, asked),
         }
     }
 }

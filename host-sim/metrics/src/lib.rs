@@ -68,8 +68,40 @@ pub struct Circumstances {
     pub probe_hz: Option<f64>,
 }
 
+/// The metrics that take most of the time of measuring a run: those that are not asked for have no value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asked {
+    /// Times to lane crossing.
+    pub crossings: bool,
+    /// Steering reversals.
+    pub reversals: bool,
+}
+
+impl Asked {
+    /// All of them.
+    pub const ALL: Self = Self {
+        crossings: true,
+        reversals: true,
+    };
+
+    /// Those among some definitions.
+    #[must_use]
+    pub fn among(definitions: &[&Definition]) -> Self {
+        let any = |part: &str| definitions.iter().any(|d| d.name.contains(part));
+        Self {
+            crossings: any("time_to_lane_crossing"),
+            reversals: any("reversals"),
+        }
+    }
+}
+
 /// Measures a run.
 pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
+    measure_asked(trace, circumstances, Asked::ALL)
+}
+
+/// Measures of a run what is asked for, and whatever takes little time.
+pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked) -> Metrics {
     let range = samples_in(&trace.samples, circumstances.window);
     let samples = &trace.samples[range.clone()];
     if samples.is_empty() || !samples.iter().all(is_finite) {
@@ -90,7 +122,7 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
     let torque = |value| without_probe(trace, circumstances.probe_hz, value);
     let torques = [torque(|s| s.driver_torque_nm), torque(|s| s.guidance_torque_nm)];
     let speeds = || samples.iter().map(|sample| speed_m_s(sample, circumstances));
-    let mut times_to_crossing_s = Vec::with_capacity(samples.len());
+    let mut times_to_crossing_s = Vec::new();
     for (place, sample) in range.clone().zip(samples) {
         let (t_d, t_h) = (sample.driver_torque_nm, sample.guidance_torque_nm);
         lateral.add(sample.lateral_error_m);
@@ -104,11 +136,13 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
             in_conflict += 1.0;
             driver_in_conflict.add(t_d);
         }
-        times_to_crossing_s.push(time_to_crossing_s(
-            sample,
-            speed_m_s(sample, circumstances),
-            half_room_m,
-        ));
+        if asked.crossings {
+            times_to_crossing_s.push(time_to_crossing_s(
+                sample,
+                speed_m_s(sample, circumstances),
+                half_room_m,
+            ));
+        }
     }
     let recovery = circumstances
         .failure
@@ -117,8 +151,11 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
     // Where no guidance ever was, none met a limit and none was in conflict: that is no share of zero.
     let is_guided = trace.samples.iter().any(|s| s.guidance_torque_nm != 0.0);
     let of_guidance = |share: f64| finite(share / count).filter(|_| is_guided);
-    let angle_deg = without_probe(trace, circumstances.probe_hz, |s| s.wheel_angle_rad.to_degrees());
-    let reversals_per_min = |kind| reversals_per_min(&angle_deg, trace.sample_rate_hz, range.clone(), kind);
+    let angle_deg = asked
+        .reversals
+        .then(|| without_probe(trace, circumstances.probe_hz, |s| s.wheel_angle_rad.to_degrees()));
+    let reversals_per_min =
+        |kind| reversals_per_min(angle_deg.as_ref()?, trace.sample_rate_hz, range.clone(), kind);
 
     Metrics {
         duration_s: finite(duration_s),

@@ -46,6 +46,47 @@ fn sine(amplitude: f64, frequency_hz: f64, t: f64) -> f64 {
     amplitude * (TAU * frequency_hz * t).sin()
 }
 
+/// What is not asked for has no value, and nothing else another one.
+#[test]
+fn what_is_not_asked_for_has_no_value() {
+    let trace = drive(20.0, |t| Sample {
+        lateral_error_m: sine(0.5, 0.2, t),
+        heading_error_rad: sine(0.01, 0.2, t),
+        wheel_angle_rad: sine(0.2, 0.3, t),
+        ..Sample::default()
+    });
+    let circumstances = Circumstances {
+        speed_m_s: 20.0,
+        lane_width_m: 3.6,
+        window: None,
+        failure: None,
+        probe_hz: None,
+    };
+    let named = |names: &[&str]| -> Vec<&Definition> {
+        DEFINITIONS.iter().filter(|d| names.contains(&d.name)).collect()
+    };
+    assert_eq!(Asked::among(&DEFINITIONS.iter().collect::<Vec<_>>()), Asked::ALL);
+    for name in [
+        "sdlp_m",
+        "min_time_to_lane_crossing_s",
+        "p15_time_to_lane_crossing_s",
+        "reversals_3deg_per_min",
+    ] {
+        let asked = Asked::among(&named(&[name]));
+        let (all, some) = (
+            measure(&trace, &circumstances),
+            measure_asked(&trace, &circumstances, asked),
+        );
+        for d in DEFINITIONS {
+            let is_left_out = d.name.contains("crossing") && !asked.crossings
+                || d.name.contains("reversals") && !asked.reversals;
+            let expected = (d.value)(&all).filter(|_| !is_left_out);
+            assert_eq!((d.value)(&some), expected, "{name}: {}", d.name);
+        }
+        assert!((named(&[name])[0].value)(&some).is_some(), "{name}");
+    }
+}
+
 /// Whole periods of a sine of amplitude A about a mean: SD and RMS A/sqrt(2), mean magnitude 2A/pi.
 #[test]
 fn lane_keeping_and_effort_of_sines() {

@@ -1,6 +1,6 @@
 //! One drive of a sweep: its scenario driven and measured.
 
-use haptic_metrics::Window;
+use haptic_metrics::{Asked, Window};
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
@@ -55,7 +55,8 @@ impl Sweep {
     }
 
     pub(super) fn measured(&self, scenario: &Scenario, run: &Run, nominal_peak_m: Option<f64>) -> Driven {
-        let record = RunRecord::new(scenario, run, self.window_of(scenario), nominal_peak_m);
+        let window = self.window_of(scenario);
+        let record = RunRecord::asked(scenario, run, window, nominal_peak_m, Asked::among(&self.metrics));
         Driven {
             diverged: record.diverged,
             end_m: record.end_m,
