@@ -19,8 +19,8 @@ pub struct LawResult {
     pub name: String,
     /// Its kind, and what is around it.
     pub kind: String,
-    /// Where it is published.
-    pub source: &'static str,
+    /// Where it is published, with "after" where some of it was chosen here.
+    pub source: String,
     /// Its parameters; of an oracle those for the first driver.
     pub values: Vec<(&'static str, f64)>,
     /// Whether it was tuned for each driver by itself.
@@ -94,6 +94,8 @@ pub struct CompareResults {
     pub drivers: Vec<[String; 2]>,
     /// Where the gains are published with which each drives without guidance; none if nowhere, and he keeps his own.
     pub by_hand: Vec<Option<&'static str>>,
+    /// K_hg at the beginning of a drive, of the drivers who have one.
+    pub k_hg: Vec<Option<f64>>,
     /// Names of the worlds; one without a name if there are none.
     pub worlds: Vec<String>,
     /// Road and speed of each place in a world.
@@ -194,6 +196,9 @@ pub(super) fn sum_up(
         drivers: (compare.drivers.iter().map(|d| [d.name.clone(), d.kinds()])).collect(),
         by_hand: (compare.by_hand.iter())
             .map(|by_hand| by_hand.as_ref().map(|(_, table)| *table))
+            .collect(),
+        k_hg: (compare.drivers.iter())
+            .map(|driver| driver.untuned_part(&compare.judged.places[0].2).ok()?.k_hg())
             .collect(),
         places: compare
             .judged
@@ -352,7 +357,7 @@ fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &boo
     LawResult {
         name: law.name.clone(),
         kind: law.kinds(),
-        source: law.kind.source,
+        source: law.kind.said_source(),
         values: law
             .kind
             .parameters

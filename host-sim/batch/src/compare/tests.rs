@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 
 use haptic_sim::guidance::OwnLaw;
-use haptic_sim::kind::{Kind, Make};
+use haptic_sim::kind::{Kind, Make, Origin};
 use haptic_sim::laws::LawView;
 use haptic_sim::parts::{PaperDriver, PaperVehicle};
 use haptic_sim::scenario::{Failure, FailureKind};
@@ -380,6 +380,7 @@ fn a_law_of_one_s_own_joins() {
     kinds.laws.push(Kind {
         name: "silent",
         source: "this test",
+        origin: Origin::Ours,
         parameters: &[],
         make: Make::Part(|_, _| Ok(Box::new(Silent))),
     });

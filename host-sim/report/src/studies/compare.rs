@@ -100,7 +100,7 @@ fn kind<P: ?Sized>(kind: &Kind<P>) -> [String; 3] {
     let parameters: Vec<String> = parameters.collect();
     [
         format!("`{}`", kind.name),
-        kind.source.into(),
+        kind.said_source(),
         parameters.join(", "),
     ]
 }
@@ -133,6 +133,7 @@ fn notes(results: &CompareResults) -> Vec<String> {
     counts
         .chain(unsettled(results))
         .chain(by_hand(results))
+        .chain(free(results))
         .chain(unsaid(results))
         .collect()
 }
@@ -171,6 +172,19 @@ fn by_hand(results: &CompareResults) -> Option<String> {
     ))
 }
 
+/// Drivers whom it costs nothing to resist.
+fn free(results: &CompareResults) -> Option<String> {
+    let drivers = results.drivers.iter().zip(&results.k_hg);
+    let free = drivers.filter(|(_, k_hg)| k_hg.is_none_or(|k_hg| k_hg == 0.0));
+    let free: Vec<&str> = free.map(|([name, _], _)| name.as_str()).collect();
+    (!free.is_empty()).then(|| {
+        format!(
+            "drivers without a K_hg, or with 0, whose model lets resistance be free (T_d is what is left after T_h): {}",
+            free.join(", ")
+        )
+    })
+}
+
 /// Means that have no interval, and are not shown.
 fn unsaid(results: &CompareResults) -> Option<String> {
     let values = results.cells.iter().flat_map(|pair| &pair.values).flatten();
@@ -200,7 +214,7 @@ fn laws(results: &CompareResults) -> Table {
         [
             ("Law", Cell::text(&law.name)),
             ("Kind", Cell::text(&law.kind)),
-            ("Source", Cell::text(law.source)),
+            ("Source", Cell::text(&law.source)),
             (
                 "Sets",
                 Cell::number(tuning.map(|tuning| f64::from(tuning.sets)), 0),

@@ -2,7 +2,7 @@
 //! Nacpil and Nakano 2022.
 
 use super::{AnyDriver, Kind, Make};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::participants::participants;
 use crate::parts::PaperDriver;
@@ -28,6 +28,7 @@ fn boxed(
 pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
     name: "paper",
     source: "Wang et al. 2022, (7) (8), table 7",
+    origin: Origin::Published,
     parameters: &[
         Parameter::published("a_1", 0.1, [0.0, 10.0]),
         Parameter::published("a_2", 0.05, [0.0, 10.0]),
@@ -58,6 +59,7 @@ pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
 pub(super) const PARTICIPANT: Kind<dyn AnyDriver> = Kind {
     name: "participant",
     source: "Wang et al. 2022, table 6",
+    origin: Origin::Published,
     parameters: &[Parameter::published("number", 1.0, [1.0, 14.0])],
     make: Make::Part(|scenario, v| {
         let all = participants();

@@ -7,7 +7,7 @@
 //! Defaults are those of Volkswagen's MQB in that repository: 50 commands a second, 0.01 N.m a count, six samples of the driver.
 
 use super::{Kind, Law, LawView, Make};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 
 /// The numbers of the rule, in any unit of torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,6 +88,7 @@ impl Law for DriverLimit {
 pub(super) const KIND: Kind<dyn Law> = Kind {
     name: "driver_limit",
     source: "opendbc, driver_limit_check",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("max_nm", 3.0, [0.0, 10.0]),
         Parameter::published("up_nm", 0.04, [0.0, 10.0]),
