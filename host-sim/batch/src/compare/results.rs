@@ -45,6 +45,10 @@ pub struct Cell {
     pub p_holm: Vec<Option<f64>>,
     /// Drives that left the road.
     pub off_road: usize,
+    /// Its drives.
+    pub drives: usize,
+    /// Drives without a value of a metric that others have, metric by metric: means leave them out.
+    pub missing: Vec<usize>,
     /// Drives in which the ECU ended guidance by its own decision.
     pub left_by_itself: usize,
     /// Failed drives that left the road.
@@ -230,7 +234,7 @@ pub(super) fn sum_up(
     }
 }
 
-fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
+pub(super) fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
     let (drivers, level) = (compare.drivers.len(), compare.level);
     let each = driven.len() / (compare.laws.len() * drivers);
     let of_cell = |law: usize, driver: usize| &driven[(law * drivers + driver) * each..][..each];
@@ -261,6 +265,8 @@ fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
         }
     };
     let mut cells: Vec<Cell> = (0..compare.laws.len() * drivers).map(cell).collect();
+            drives: own.len(),
+            missing: (0..METRICS.len()).map(|metric| missing(own, metric)).collect(),
     correct(cells.iter_mut().flat_map(|cell| &mut cell.p_holm).collect());
     cells
 }
@@ -271,6 +277,15 @@ fn correct(family: Vec<&mut Option<f64>>) {
     let corrected = holm(&family.iter().map(|p| **p).collect::<Vec<_>>());
     for (p, corrected) in family.iter_mut().zip(corrected) {
         **p = corrected;
+/// How many drives have no value of a metric; 0 where none has.
+fn missing(drives: &[Driven], metric: usize) -> usize {
+    let without = drives
+        .iter()
+        .filter(|drive| drive.values[metric].is_none())
+        .count();
+    if without == drives.len() { 0 } else { without }
+}
+
     }
 }
 

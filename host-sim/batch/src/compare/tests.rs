@@ -415,6 +415,31 @@ const WRONG: [(&str, &str, &str); 34] = [
     (
         "[faults]",
         "[[world]]\nname = 'w'\nscenario = { speed = 5 }\n[faults]",
+/// One drive of four without a value is counted, a metric that no drive has is not.
+#[test]
+fn drives_without_a_value_are_counted() {
+    let kinds = Kinds::default();
+    let compare = compare(FILE, &kinds).unwrap();
+    let drive = |tlc_s| {
+        let mut values = [Some(1.0); METRICS.len()];
+        (values[3], values[9]) = (tlc_s, None);
+        Driven {
+            values,
+            off_road: false,
+            left_by_itself: false,
+            failed_off_road: 0,
+        }
+    };
+    let mut driven = vec![drive(Some(2.0)); 16];
+    driven[5] = drive(None);
+    let cells = results::cells(&compare, &driven);
+    let missing: Vec<[usize; 3]> = (cells.iter())
+        .map(|cell| [0, 3, 9].map(|metric| cell.missing[metric]))
+        .collect();
+    assert_eq!(missing, [[0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 0]]);
+    assert_eq!(cells[1].drives, 4);
+}
+
         "study.toml: world w: scenario.speed: this file has its own seeds",
     ),
     (

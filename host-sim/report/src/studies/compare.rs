@@ -138,6 +138,7 @@ fn notes(results: &CompareResults) -> Vec<String> {
         .collect()
 }
 
+        .chain(missing(results))
 /// Laws whose objective still moved when the budget was used up.
 fn unsettled(results: &CompareResults) -> Option<String> {
     let open = results
@@ -199,6 +200,32 @@ fn unsaid(results: &CompareResults) -> Option<String> {
 /// A mean with half its interval; a dash for one without.
 fn said(value: Option<&Mean>) -> String {
     with_interval(value.filter(|mean| mean.interval.is_some()))
+/// Drives that a mean of some of its drives passes over.
+fn missing(results: &CompareResults) -> Option<String> {
+    let places = 0..results.metrics.len();
+    let of_pair = |pair: &Pair| {
+        let told = places
+            .clone()
+            .filter(|place| pair.missing[*place] > 0)
+            .map(|place| {
+                let (law, driver) = (&results.laws[pair.law].name, &results.drivers[pair.driver][0]);
+                let label = results.metrics[place].label;
+                format!(
+                    "{label} of {law} with {driver} ({} of {})",
+                    pair.missing[place], pair.drives
+                )
+            });
+        told.collect::<Vec<String>>()
+    };
+    let told: Vec<String> = results.cells.iter().flat_map(of_pair).collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "drives without a value, which the means leave out: {}",
+            told.join(", ")
+        )
+    })
+}
+
 }
 
 fn laws(results: &CompareResults) -> Table {
