@@ -8,7 +8,9 @@ use serde::Serialize;
 use crate::several::holm;
 
 use super::tune::Tuned;
-use super::{Compare, Driven, Faults, FrontPoint, METRICS, Mean, Metric, TunedBy, Unit, by_unit, mean_of};
+use super::{
+    Adapted, Compare, Driven, Faults, FrontPoint, METRICS, Mean, Metric, TunedBy, Unit, by_unit, mean_of,
+};
 use crate::engine::{Entry, EntryKind, Tables};
 use crate::statistics::{Confidence, p_of_zero};
 
@@ -43,12 +45,12 @@ pub struct Cell {
     /// How probable so large a difference is where there is none, corrected by Holm's method for all cells and judged metrics; none of a
     /// metric that is not judged by.
     pub p_holm: Vec<Option<f64>>,
-    /// Drives that left the road.
-    pub off_road: usize,
     /// Its drives.
     pub drives: usize,
     /// Drives without a value of a metric that others have, metric by metric: means leave them out.
     pub missing: Vec<usize>,
+    /// Drives that left the road.
+    pub off_road: usize,
     /// Drives in which the ECU ended guidance by its own decision.
     pub left_by_itself: usize,
     /// Failed drives that left the road.
@@ -121,6 +123,8 @@ pub struct CompareResults {
     pub cells: Vec<Cell>,
     /// By law, then world, then metric, without the first law.
     pub ratios: Vec<Ratio>,
+    /// Where drivers who adapt stand behind their days.
+    pub adapted: Vec<Adapted>,
     /// What each law trades, by law, then peak.
     pub front: Vec<FrontPoint>,
     /// Every judged drive.
@@ -183,6 +187,7 @@ pub(super) fn sum_up(
     tuned: Vec<Tuned>,
     driven: &[Driven],
     front: Vec<FrontPoint>,
+    adapted: Vec<Option<Adapted>>,
 ) -> CompareResults {
     let places = compare.judged.places.len() / compare.worlds.len();
     let Faults {
@@ -227,6 +232,7 @@ pub(super) fn sum_up(
         instants: [sudden_loss, silent_lane],
         cells: cells(compare, driven),
         ratios: ratios(compare, driven),
+        adapted: adapted.into_iter().flatten().collect(),
         front,
         rows: (driven.iter().enumerate())
             .map(|(number, driven)| drive_row(compare, number, driven))
@@ -259,24 +265,18 @@ pub(super) fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
                 .map(|metric| mean_of(&apart(metric), level))
                 .collect(),
             p_holm: metrics.map(p).collect(),
+            drives: own.len(),
+            missing: (0..METRICS.len()).map(|metric| missing(own, metric)).collect(),
             off_road: own.iter().filter(|d| d.off_road).count(),
             left_by_itself: own.iter().filter(|d| d.left_by_itself).count(),
             failed_off_road: own.iter().map(|d| d.failed_off_road).sum(),
         }
     };
     let mut cells: Vec<Cell> = (0..compare.laws.len() * drivers).map(cell).collect();
-            drives: own.len(),
-            missing: (0..METRICS.len()).map(|metric| missing(own, metric)).collect(),
     correct(cells.iter_mut().flat_map(|cell| &mut cell.p_holm).collect());
     cells
 }
 
-/// Holm's correction of a family, in place.
-fn correct(family: Vec<&mut Option<f64>>) {
-    let mut family: Vec<&mut f64> = family.into_iter().filter_map(Option::as_mut).collect();
-    let corrected = holm(&family.iter().map(|p| **p).collect::<Vec<_>>());
-    for (p, corrected) in family.iter_mut().zip(corrected) {
-        **p = corrected;
 /// How many drives have no value of a metric; 0 where none has.
 fn missing(drives: &[Driven], metric: usize) -> usize {
     let without = drives
@@ -286,6 +286,12 @@ fn missing(drives: &[Driven], metric: usize) -> usize {
     if without == drives.len() { 0 } else { without }
 }
 
+/// Holm's correction of a family, in place.
+fn correct(family: Vec<&mut Option<f64>>) {
+    let mut family: Vec<&mut f64> = family.into_iter().filter_map(Option::as_mut).collect();
+    let corrected = holm(&family.iter().map(|p| **p).collect::<Vec<_>>());
+    for (p, corrected) in family.iter_mut().zip(corrected) {
+        **p = corrected;
     }
 }
 

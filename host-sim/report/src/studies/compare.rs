@@ -30,7 +30,10 @@ pub fn report(results: &CompareResults) -> Report {
     });
     let first = &results.laws[0].name;
     let verdicts = vec![Block::Text(judgement(results)), Block::Table(worse(results))];
-    let of_all = vec![Block::Table(ratios(results))];
+    let mut of_all = vec![Block::Table(ratios(results))];
+    if !results.adapted.is_empty() {
+        of_all.push(Block::Table(adapted(results)));
+    }
     let front = vec![
         Block::figure("front", front_figure(results), front_caption(results)),
         Block::Table(front_table(results)),
@@ -135,10 +138,10 @@ fn notes(results: &CompareResults) -> Vec<String> {
         .chain(by_hand(results))
         .chain(free(results))
         .chain(unsaid(results))
+        .chain(missing(results))
         .collect()
 }
 
-        .chain(missing(results))
 /// Laws whose objective still moved when the budget was used up.
 fn unsettled(results: &CompareResults) -> Option<String> {
     let open = results
@@ -197,9 +200,6 @@ fn unsaid(results: &CompareResults) -> Option<String> {
     (count > 0).then(|| format!("{count} means have no interval, and are not shown: {why}"))
 }
 
-/// A mean with half its interval; a dash for one without.
-fn said(value: Option<&Mean>) -> String {
-    with_interval(value.filter(|mean| mean.interval.is_some()))
 /// Drives that a mean of some of its drives passes over.
 fn missing(results: &CompareResults) -> Option<String> {
     let places = 0..results.metrics.len();
@@ -226,6 +226,9 @@ fn missing(results: &CompareResults) -> Option<String> {
     })
 }
 
+/// A mean with half its interval; a dash for one without.
+fn said(value: Option<&Mean>) -> String {
+    with_interval(value.filter(|mean| mean.interval.is_some()))
 }
 
 fn laws(results: &CompareResults) -> Table {
@@ -298,6 +301,28 @@ fn ratios(results: &CompareResults) -> Table {
         results.laws[0].name, results.units[1], results.units[0]
     );
     Table::new(caption, columns, pairs.map(row))
+}
+
+/// Where drivers who adapt stand behind their days.
+fn adapted(results: &CompareResults) -> Table {
+    let pairs =
+        (0..results.laws.len()).flat_map(|law| (0..results.worlds.len()).map(move |world| (law, world)));
+    let row = |(law, world): (usize, usize)| {
+        let own = results
+            .adapted
+            .iter()
+            .filter(|own| (own.law, own.world) == (law, world));
+        let shares: Vec<f64> = own.map(|own| own.share).collect();
+        let end = |end: fn(f64, f64) -> f64| Cell::number(shares.iter().copied().reduce(end), 3);
+        let head = [&results.laws[law].name, &results.worlds[world]].map(Cell::text);
+        (!shares.is_empty()).then(|| head.into_iter().chain([end(f64::min), end(f64::max)]).collect())
+    };
+    let caption = "Drivers who adapt: the share of their guided gains behind their days, 1 with those of table 6, 0 with those of table 5";
+    Table::new(
+        caption,
+        ["Law", "World", "Least", "Largest"],
+        pairs.filter_map(row),
+    )
 }
 
 /// Whether a probability, corrected, is below what the level leaves.

@@ -50,9 +50,10 @@ impl Driver for Box<dyn AnyDriver> {
 }
 
 /// Every driver here.
-pub const DRIVERS: [Kind<dyn AnyDriver>; 6] = [
+pub const DRIVERS: [Kind<dyn AnyDriver>; 7] = [
     paper::KIND,
     paper::PARTICIPANT,
+    paper::ADAPTING,
     cybernetic::KIND,
     cybernetic::CURVATURE,
     two_point::KIND,

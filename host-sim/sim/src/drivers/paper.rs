@@ -1,5 +1,8 @@
 //! The paper's driver, (7) and (8), with parameters of a file's own, or those of a participant of table 6. Source: Wang, Zheng,
 //! Nacpil and Nakano 2022.
+//!
+//! *Adapting*: every value between those of a participant by hand (table 5, share 0) and with guidance (table 6, share 1). A comparison moves
+//! the share over days; in a drive it stays. Ours: that the way between the two is straight, and how many days it takes.
 
 use super::{AnyDriver, Kind, Make};
 use crate::kind::{Origin, Parameter};
@@ -60,11 +63,27 @@ pub(super) const PARTICIPANT: Kind<dyn AnyDriver> = Kind {
     name: "participant",
     source: "Wang et al. 2022, table 6",
     origin: Origin::Published,
-    parameters: &[Parameter::published("number", 1.0, [1.0, 14.0])],
-    make: Make::Part(|scenario, v| {
-        let all = participants();
-        let number = v[0].round() as usize;
-        let guided = all[number.clamp(1, all.len()) - 1].guided;
-        boxed(scenario, guided.parameters(), guided.gains())
-    }),
+    parameters: &[NUMBER],
+    make: Make::Part(|scenario, v| participant(scenario, v[0], 1.0)),
 };
+
+pub(super) const ADAPTING: Kind<dyn AnyDriver> = Kind {
+    name: "adapting",
+    source: "Wang et al. 2022, tables 5 and 6",
+    origin: Origin::After,
+    parameters: &[
+        NUMBER,
+        Parameter::ours("share", 1.0, [0.0, 1.0]),
+        Parameter::ours("days", 3.0, [0.1, 1000.0]),
+    ],
+    make: Make::Part(|scenario, v| participant(scenario, v[0], v[1])),
+};
+
+const NUMBER: Parameter = Parameter::published("number", 1.0, [1.0, 14.0]);
+
+fn participant(scenario: &Scenario, number: f64, share: f64) -> Result<Box<dyn AnyDriver>, ScenarioError> {
+    let all = participants();
+    let number = (number.round() as usize).clamp(1, all.len());
+    let own = all[number - 1].between(share);
+    boxed(scenario, own.parameters(), own.gains())
+}

@@ -270,6 +270,33 @@ fn published_drivers_are_those_of_the_simulator() {
     }
 }
 
+/// Participant 13 at his ends is the driver of table 6 and that of table 5, in the middle he has their means: written here.
+#[test]
+fn who_adapts_lies_between_the_tables() {
+    let scenario = Scenario::default();
+    for (share, same, values) in [
+        (1.0, "participant", vec![("number", 13.0)]),
+        (0.0, "paper", paper_of([0.074, 0.015, 3.523, 0.038, 3.719, 0.0])),
+        (
+            0.5,
+            "paper",
+            paper_of([0.080, 0.009, 3.4995, 0.042, 2.922, 0.0175]),
+        ),
+    ] {
+        let mut own = driver(&scenario, "adapting", &[("number", 13.0), ("share", share)]);
+        let mut same = driver(&scenario, same, &values);
+        for step in 0..3000 {
+            let apart_nm = own.step(&view(step)) - same.step(&view(step));
+            assert!(apart_nm.abs() < 1e-12, "{share} {step} {apart_nm}");
+        }
+    }
+}
+
+fn paper_of(values: [f64; 6]) -> Vec<(&'static str, f64)> {
+    let names = ["a_1", "a_2", "a_3", "t_p_s", "k_d_nm_per_rad", "k_hg"];
+    names.into_iter().zip(values).collect()
+}
+
 /// All drivers with their defaults keep the lane of the paper's course, each habit around the paper's driver too. The
 /// law is the paper's, but for the relay: a driver who yields wholly to a guidance on the side of the target leaves the
 /// lane under one that cannot steer alone.
