@@ -7,7 +7,7 @@ use std::path::Path;
 use haptic_batch::compare::{Compare, Kinds};
 use haptic_batch::engine::Watch;
 use haptic_report::studies::compare::report;
-use haptic_sim::kind::{Kind, Make, Parameter};
+use haptic_sim::kind::{Kind, Make, Origin, Parameter};
 use haptic_sim::laws::{Law, LawView};
 
 /// A spring that pulls the wheel to the angle that the lane ahead asks for.
@@ -27,6 +27,7 @@ impl Law for Spring {
 const SPRING: Kind<dyn Law> = Kind {
     name: "spring",
     source: "this file",
+    origin: Origin::Ours,
     parameters: &[
         Parameter::ours("per_e_y_rad_per_m", 0.5, [0.0, 10.0]),
         Parameter::ours("stiffness_nm_per_rad", 2.0, [0.0, 20.0]).tuned(0.5, 4.0),

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use haptic_batch::compare::{Compare, CompareResults, Kinds, METRICS};
 use haptic_batch::engine::{Watch, on_threads};
-use haptic_sim::drivers::AnyDriver;
-use haptic_sim::kind::{Kind, Make, Parameter};
+use haptic_sim::drivers::{AnyDriver, with_remnant};
+use haptic_sim::kind::{Kind, Make, Origin, Parameter};
 use haptic_sim::laws::{self, Law};
 use haptic_sim::models::STEP_S;
 use haptic_sim::parts::{self, Driver};
@@ -181,7 +181,7 @@ fn kind<P: ?Sized>(
     name: &str,
     factory: &Bound<'_, PyAny>,
     raised: &Raised,
-    boxed: fn(Object) -> Box<P>,
+    boxed: fn(&Scenario, Object) -> Box<P>,
 ) -> PyResult<Kind<P>> {
     let given: Vec<(String, Given)> = match factory.getattr_opt("parameters")? {
         None => Vec::new(),
@@ -211,11 +211,12 @@ fn kind<P: ?Sized>(
             .map(|p| p.name)
             .zip(values.iter().copied())
             .collect();
-        Ok(boxed(Object::new(scenario, &factory, &named, &raised)))
+        Ok(boxed(scenario, Object::new(scenario, &factory, &named, &raised)))
     };
     Ok(Kind {
         name: name.to_owned().leak(),
         source: "Python",
+        origin: Origin::Ours,
         parameters,
         make: Make::Given(Box::leak(Box::new(make))),
     })
@@ -237,13 +238,13 @@ pub(crate) fn compare<'py>(
         let name: String = name.extract()?;
         kinds
             .laws
-            .push(kind::<dyn Law>(py, &name, &factory, &raised, |law| {
+            .push(kind::<dyn Law>(py, &name, &factory, &raised, |_, law| {
                 Box::new(law)
             })?);
     }
     for (name, factory) in drivers {
         let name: String = name.extract()?;
-        let boxed = |driver| -> Box<dyn AnyDriver> { Box::new(driver) };
+        let boxed = |scenario: &Scenario, driver| -> Box<dyn AnyDriver> { with_remnant(scenario, driver) };
         kinds.drivers.push(kind(py, &name, &factory, &raised, boxed)?);
     }
     let heard = Arc::clone(&raised);

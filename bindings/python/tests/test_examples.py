@@ -37,6 +37,11 @@ def test_a_law_and_a_driver_of_ones_own_are_compared():
     assert [law["source"] for law in found.results["laws"]] == ["Wang et al. 2022, (9), table 8", "Python"]
     assert found.results["laws"][1]["values"] == [["stiffness_nm_per_rad", 3.0]]
     assert all(drive["worst_peak_after_loss_m"] > 0 for drive in found.drives)
+    # A driver of one's own has the remnant that the scenario asks for.
+    compared = example["compared"]
+    compared.__globals__["FILE"] = example["FILE"].replace("remnant_sd_nm = 0.1", "remnant_sd_nm = 0")
+    quiet_m = {(drive["law"], drive["driver"]): drive["peak_lateral_error_m"] for drive in compared().drives}
+    assert all(quiet_m[pair] != peak_m for pair, peak_m in peaks_m.items())
     # The paper's law written in Python is the paper's law: the same torque asked for, to the last bit.
     class Paper:
         def ask(self, view):
@@ -44,7 +49,6 @@ def test_a_law_and_a_driver_of_ones_own_are_compared():
             return 0.25 * (terms[0] + terms[1] + terms[2] + 1.0 * view.e_theta_rate_rad_per_s)
 
     text = example["FILE"].replace('kind = "spring", stiffness_nm_per_rad = 3', 'kind = "mine"')
-    compared = example["compared"]
     compared.__globals__["FILE"] = text.replace(', { kind = "intermittent" }', "")
     compared.__globals__["Spring"] = Paper
     with pytest.raises(hg.InputError, match='law.kind: there is no "mine", only none'):

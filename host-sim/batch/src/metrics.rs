@@ -75,15 +75,20 @@ pub(crate) fn measured(
     off_road: bool,
     failed: &[After],
 ) -> [Option<f64>; METRICS.len()] {
-    let guidance = scenario.guidance();
     let circumstances = Circumstances {
         speed_m_s: scenario.speed_m_per_s(),
         lane_width_m: scenario.course().lane_width_m(),
         window: None,
         failure: None,
-        probe_hz: guidance.probe.then_some(guidance.controller.probe_frequency_hz),
+        probe_hz: probe_hz(scenario),
     };
     values(&measure(trace, &circumstances), off_road, failed)
+}
+
+/// Frequency of a scenario's probe, if it is on.
+pub(crate) fn probe_hz(scenario: &Scenario) -> Option<f64> {
+    let guidance = scenario.guidance();
+    guidance.probe.then_some(guidance.controller.probe_frequency_hz)
 }
 
 fn values(metrics: &Metrics, off_road: bool, failed: &[After]) -> [Option<f64>; METRICS.len()] {

@@ -134,7 +134,7 @@ impl<'k> Chosen<'k, dyn AnyDriver> {
     pub(crate) fn by_hand(&self, kinds: &'k [Kind<dyn AnyDriver>]) -> Option<(Self, &'static str)> {
         let untuned = self.untuned();
         let (values, table) = match (self.kind.name, &untuned[..]) {
-            ("participant", [number]) => {
+            ("participant", [number]) | ("adapting", [number, ..]) => {
                 let own = participants()
                     .into_iter()
                     .find(|p| f64::from(p.number) == number.round())?
@@ -153,6 +153,25 @@ impl<'k> Chosen<'k, dyn AnyDriver> {
             around: self.around.clone(),
         };
         Some((by_hand, table))
+    }
+
+    /// The share of his guided gains with which a driver who adapts begins, and over how many days he follows; none of one who does not.
+    pub(crate) fn adapts(&self) -> Option<[f64; 2]> {
+        match (self.kind.name, &self.untuned()[..]) {
+            ("adapting", [_, share, days]) => Some([*share, *days]),
+            _ => None,
+        }
+    }
+
+    /// A driver who adapts, with a share of his guided gains.
+    pub(crate) fn with_share(
+        &self,
+        scenario: &Scenario,
+        share: f64,
+    ) -> Result<Box<dyn AnyDriver>, ScenarioError> {
+        let mut values = self.untuned();
+        values[1] = share;
+        self.make(scenario, &values)
     }
 }
 

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use haptic_sim::kind::{Kind, Make, Parameter};
+use haptic_sim::kind::{Kind, Make, Origin, Parameter};
 use haptic_sim::laws::{Law, LawView};
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::road::Centreline;
@@ -48,6 +48,7 @@ impl Law for Path {
 pub(crate) const KIND: Kind<dyn Law> = Kind {
     name: "path",
     source: "ours",
+    origin: Origin::Ours,
     parameters: &[
         Parameter::ours("offset_m", 0.0, [-2.0, 2.0]),
         Parameter::ours("cut_m2", 0.0, [-200.0, 200.0]),

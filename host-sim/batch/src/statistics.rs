@@ -183,9 +183,13 @@ impl Serialize for Mean {
     }
 }
 
-/// Standard deviation about their mean, divisor n - 1; none of fewer than two.
+/// Standard deviation about their mean, divisor n - 1; none of fewer than two. Equal values have none at all, though their mean is rounded.
 pub(crate) fn deviation(values: &[f64], mean: f64) -> Option<f64> {
     let freedom = values.len() as f64 - 1.0;
+    let mean = match values {
+        [first, rest @ ..] if rest.iter().all(|value| value == first) => *first,
+        _ => mean,
+    };
     let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (values.len() > 1).then(|| (square / freedom).sqrt())
 }
@@ -283,6 +287,8 @@ mod tests {
             assert!((p - 0.120_243_340_6).abs() < 1e-9, "{p}");
         }
         assert_eq!((p_of_zero(&[0.3]), p_of_zero(&[0.3, 0.3])), (None, None));
+        // Their sum over three is not 0.1 in float64.
+        assert_eq!(p_of_zero(&[0.1, 0.1, 0.1]), None);
     }
 
     /// A twentieth shared among 14 is 0.00357; of one it stays.

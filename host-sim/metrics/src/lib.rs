@@ -203,7 +203,7 @@ fn reversals_per_min(
 
 /// A quantity over the whole run, so that the ends of a window carry no transient of the filter; as it is where there is no
 /// probe, or the run is too short to filter.
-fn without_probe(trace: &Trace, probe_hz: Option<f64>, value: fn(&Sample) -> f64) -> Vec<f64> {
+pub fn without_probe(trace: &Trace, probe_hz: Option<f64>, value: fn(&Sample) -> f64) -> Vec<f64> {
     let record: Vec<f64> = trace.samples.iter().map(value).collect();
     let notched = |hz| zero_phase_notch(&record, trace.sample_rate_hz, hz, PROBE_WIDTH_HZ);
     probe_hz.and_then(notched).unwrap_or(record)

@@ -6,11 +6,13 @@
 use crate::input::{RangeError, in_range};
 use crate::scenario::{Scenario, ScenarioError};
 
-/// Where a default comes from.
+/// Where a kind or a default comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// The source of the kind has it.
     Published,
+    /// The source has it in part; what it leaves open, or what differs, was chosen here.
+    After,
     /// It was chosen here.
     Ours,
 }
@@ -85,8 +87,10 @@ pub enum Make<P: ?Sized + 'static> {
 pub struct Kind<P: ?Sized + 'static> {
     /// Its name in a file.
     pub name: &'static str,
-    /// Where it is published.
+    /// Where it is published, or whose it is.
     pub source: &'static str,
+    /// How much of its equation the source has.
+    pub origin: Origin,
     /// What it takes.
     pub parameters: &'static [Parameter],
     /// How it is made.
@@ -97,5 +101,13 @@ impl<P: ?Sized> Kind<P> {
     /// The defaults of its parameters.
     pub fn defaults(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| p.default).collect()
+    }
+
+    /// Its source in words; "after" where some of the equation was chosen here.
+    pub fn said_source(&self) -> String {
+        match self.origin {
+            Origin::After => format!("after {}", self.source),
+            Origin::Published | Origin::Ours => self.source.to_owned(),
+        }
     }
 }

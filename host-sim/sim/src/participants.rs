@@ -61,6 +61,25 @@ pub struct Participant {
     pub guided: PublishedDriver,
 }
 
+impl Participant {
+    /// The driver between the manual one (share 0) and the guided one (1), each value on the straight line between both. The fitness, which is
+    /// of fits, is the guided one's.
+    #[must_use]
+    pub fn between(&self, share: f64) -> PublishedDriver {
+        let value =
+            |of: fn(&PublishedDriver) -> f64| (1.0 - share) * of(&self.manual) + share * of(&self.guided);
+        PublishedDriver {
+            a_1: value(|own| own.a_1),
+            a_2: value(|own| own.a_2),
+            a_3: value(|own| own.a_3),
+            t_p: value(|own| own.t_p),
+            k_d: value(|own| own.k_d),
+            k_hg: Some(value(|own| own.gains().k_hg)),
+            fitness: self.guided.fitness,
+        }
+    }
+}
+
 #[derive(Deserialize)]
 struct File {
     participant: Vec<Participant>,

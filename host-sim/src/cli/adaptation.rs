@@ -25,7 +25,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let mut study = Adaptation::load(&arguments.file, &kinds)?;
     study.level = arguments.driven.level.level;
     let output = arguments.driven.results.begin("adaptation")?;
-    let results = progress::watched("drives", |watch| {
+    let results = progress::timed("drives", |watch| {
         arguments.driven.threads.run(|| study.run(watch))
     })??;
     if let Some(place) = output.place() {

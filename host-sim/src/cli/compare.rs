@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         ..Compare::load(file, &kinds)?
     };
     let output = arguments.driven.results.begin("compare")?;
-    let results = progress::watched("drives", |watch| {
+    let results = progress::timed("drives", |watch| {
         arguments.driven.threads.run(|| compare.run(watch))
     })??;
     if let Some(place) = output.place() {

@@ -3,6 +3,7 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Instant;
 
 use clap::Args;
 use haptic_batch::engine::{Progress, Watch, on_threads};
@@ -44,6 +45,14 @@ pub fn watched<T>(unit: &str, work: impl FnOnce(&Watch<'_>) -> T) -> T {
     };
     let done = work(&Watch::new(&hear));
     bar.finish_and_clear();
+    done
+}
+
+/// Work that takes minutes, watched: behind it stderr has how long it took, by which the next can be planned.
+pub fn timed<T>(unit: &str, work: impl FnOnce(&Watch<'_>) -> T) -> T {
+    let since = Instant::now();
+    let done = watched(unit, work);
+    eprintln!("took {:.0} s", since.elapsed().as_secs_f64());
     done
 }
 

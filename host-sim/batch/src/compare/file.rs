@@ -34,6 +34,8 @@ struct File {
     faults: Faults,
     tuning: Option<TuningFile>,
     #[serde(default)]
+    days: u64,
+    #[serde(default)]
     world: Vec<WorldFile>,
     law: Vec<Table>,
     driver: Vec<Table>,
@@ -43,6 +45,7 @@ struct File {
 #[serde(deny_unknown_fields)]
 struct WorldFile {
     name: String,
+    days: Option<u64>,
     #[serde(default)]
     scenario: Table,
 }
@@ -81,6 +84,9 @@ fn front() -> u64 {
 
 /// Most drives of a comparison.
 const MOST_DRIVES: f64 = 1e6;
+/// Most days that drivers adapt for.
+const MOST_DAYS: f64 = 1000.0;
+
 pub(super) fn from_text<'k>(
     source: &Source,
     text: &str,
@@ -103,6 +109,17 @@ pub(super) fn from_text<'k>(
         source.within(&format!("faults.{field}"), f64::from(count), 0.0, 1000.0, "")?;
     }
     source.within("faults.lasts_s", faults.lasts_s, 1.0, 600.0, "s")?;
+    let days = match &file.world[..] {
+        [] => vec![file.days],
+        worlds => worlds
+            .iter()
+            .map(|world| world.days.unwrap_or(file.days))
+            .collect(),
+    };
+    let days = days
+        .into_iter()
+        .map(|days| source.count("days", days, 0.0, MOST_DAYS));
+    let days = days.collect::<Result<_, _>>()?;
     let compare = Compare {
         name: file.name,
         seed: file.seed,
@@ -115,6 +132,7 @@ pub(super) fn from_text<'k>(
         drivers_are_a_sample: file.drivers_are_a_sample,
         judged,
         worlds,
+        days,
         oracles,
         tuning,
         faults,
@@ -207,9 +225,12 @@ fn check_parts(source: &Source, compare: &Compare) -> Result<(), InputError> {
     let tuned = compare.tuning.as_ref().map_or(0.0, |t| {
         count(&t.drives, laws * t.budget as usize) + count(&compare.judged, laws * t.front as usize)
     });
+    let adapting = compare.drivers.iter().filter(|driver| driver.adapts().is_some());
+    let sets = laws + compare.tuning.as_ref().map_or(0, |t| laws * t.front as usize);
+    let lived = (adapting.count() * (sets + 1)) as f64 * f64::from(compare.days.iter().sum::<u32>());
     source.within(
-        "laws x drivers x roads x speeds x seeds, with tuning",
-        tuned + count(&compare.judged, laws),
+        "laws x drivers x roads x speeds x seeds, with tuning and days",
+        tuned + count(&compare.judged, laws) + lived,
         1.0,
         MOST_DRIVES,
         "",

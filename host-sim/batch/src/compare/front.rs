@@ -5,7 +5,7 @@ use crate::several::holm;
 use serde::Serialize;
 
 use super::tune::Tuned;
-use super::{Compare, Driven, Faults, Mean, Set, StudyError, Watch, by_unit, mean_of};
+use super::{Compare, Driven, Faults, Mean, Set, Stage, StudyError, Watch, by_unit, mean_of};
 use crate::metrics::TRADED;
 use crate::statistics::p_of_zero;
 
@@ -44,7 +44,8 @@ pub(super) fn fronts(
             drivers: 0..drivers,
         }));
     }
-    let driven = compare.drive(&sets, &compare.judged, "judged", Faults::default(), watch)?;
+    let adapted = compare.behind_days(&sets, watch)?;
+    let driven = compare.drive(&sets, Stage::Judged(&adapted, Faults::default()), watch)?;
     let each = judged.len() / compare.laws.len();
     let laws = (0..compare.laws.len()).map(|law| (law, &tuned[law].values[0], true));
     let others = sets.iter().map(|set| (set.law, &set.values, false));

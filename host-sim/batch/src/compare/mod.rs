@@ -10,6 +10,7 @@
 //!
 //! Not here: the laws and drivers (`haptic_sim::laws`, `haptic_sim::drivers`).
 
+mod days;
 mod drive;
 mod file;
 mod front;
@@ -36,6 +37,7 @@ pub use crate::metrics::{METRICS, Metric};
 pub use crate::parts::{Chosen, Kinds};
 pub use crate::places::Unit;
 pub use crate::statistics::Mean;
+pub use days::Adapted;
 pub use drive::Driven;
 pub use front::FrontPoint;
 pub use results::{Cell, CompareResults, DriveRow, LawResult, Ratio};
@@ -71,6 +73,8 @@ pub struct Compare<'k> {
     pub judged: Drives,
     /// Names of the worlds; one without a name if the file has none.
     pub worlds: Vec<String>,
+    /// How many days drivers who adapt have driven in each world before they are judged.
+    pub days: Vec<u32>,
     /// Drivers without guidance, if they are published, and where.
     pub by_hand: Vec<Option<(Chosen<'k, dyn AnyDriver>, &'static str)>>,
     /// Whether the drivers are a sample of those that are meant: then means over drivers have intervals over drivers.
@@ -91,6 +95,21 @@ struct Set {
     law: usize,
     values: Vec<f64>,
     drivers: Range<usize>,
+}
+
+/// What sets are driven for.
+#[derive(Clone, Copy)]
+enum Stage<'a> {
+    /// On the training drives, whose drivers have not adapted yet, without failures.
+    Tuning(&'a Drives),
+    /// On the judged drives, by drivers who stand where their days left them.
+    Judged(&'a [Option<Adapted>], Faults),
+}
+
+/// Each set with each of its drivers.
+fn pairs(sets: &[Set]) -> impl Iterator<Item = (&Set, usize)> {
+    sets.iter()
+        .flat_map(|set| set.drivers.clone().map(move |driver| (set, driver)))
 }
 
 impl<'k> Compare<'k> {
@@ -117,9 +136,10 @@ impl<'k> Compare<'k> {
         };
         let sets = (0..self.laws.len()).flat_map(|law| (0..drivers).map(move |driver| (law, driver)));
         let sets: Vec<Set> = sets.map(|(law, driver)| set(law, driver)).collect();
-        let driven = self.drive(&sets, &self.judged, "judged", self.faults, watch)?;
+        let adapted = self.behind_days(&sets, watch)?;
+        let driven = self.drive(&sets, Stage::Judged(&adapted, self.faults), watch)?;
         let front = front::fronts(self, &tuned, &driven, watch)?;
-        Ok(results::sum_up(self, tuned, &driven, front))
+        Ok(results::sum_up(self, tuned, &driven, front, adapted))
     }
 
     /// How many units are judged.
@@ -133,37 +153,38 @@ impl<'k> Compare<'k> {
     }
 
     /// Drives each set with its drivers, at each place, with each seed.
-    fn drive(
-        &self,
-        sets: &[Set],
-        drives: &Drives,
-        stream: &str,
-        faults: Faults,
-        watch: &Watch<'_>,
-    ) -> Result<Vec<Driven>, StudyError> {
+    fn drive(&self, sets: &[Set], stage: Stage<'_>, watch: &Watch<'_>) -> Result<Vec<Driven>, StudyError> {
+        let (drives, stream, faults) = match stage {
+            Stage::Tuning(drives) => (drives, "tuning", Faults::default()),
+            Stage::Judged(_, faults) => (&self.judged, "judged", faults),
+        };
+        let in_world = drives.places.len() / self.worlds.len().min(drives.places.len());
         let mut jobs = Vec::new();
-        for set in sets {
-            for driver in set.drivers.clone() {
-                for place in &drives.places {
-                    jobs.extend((0..drives.seeds).map(|seed| (set, driver, place, seed)));
-                }
+        for (pair, (set, driver)) in pairs(sets).enumerate() {
+            for (number, place) in drives.places.iter().enumerate() {
+                let adapted = match stage {
+                    Stage::Tuning(_) => None,
+                    Stage::Judged(adapted, _) => {
+                        adapted[pair * self.worlds.len() + number / in_world].as_ref()
+                    }
+                };
+                jobs.extend((0..drives.seeds).map(|seed| (set, driver, place, adapted, seed)));
             }
         }
         each(
             &jobs,
             watch,
-            |&(set, driver, (road, speed_kmh, scenario), seed)| {
+            |&(set, driver, (road, speed_kmh, scenario), adapted, seed)| {
                 let seed = seed_of(self.seed, stream, road, *speed_kmh, seed);
                 let scenario = scenario.to_builder().seed(seed).build()?;
                 let law = self.laws[set.law].make(&scenario, &set.values)?;
                 let by_hand = self.by_hand[driver].as_ref().filter(|_| self.is_none(set.law));
-                let driver = by_hand.map_or(&self.drivers[driver], |(by_hand, _)| by_hand);
-                Ok(Driven::new(
-                    &scenario,
-                    law,
-                    driver.untuned_part(&scenario)?,
-                    faults,
-                ))
+                let chosen = by_hand.map_or(&self.drivers[driver], |(by_hand, _)| by_hand);
+                let driver = match adapted {
+                    Some(adapted) => chosen.with_share(&scenario, adapted.share)?,
+                    None => chosen.untuned_part(&scenario)?,
+                };
+                Ok(Driven::new(&scenario, law, driver, faults))
             },
         )
     }

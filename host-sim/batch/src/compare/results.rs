@@ -8,7 +8,9 @@ use serde::Serialize;
 use crate::several::holm;
 
 use super::tune::Tuned;
-use super::{Compare, Driven, Faults, FrontPoint, METRICS, Mean, Metric, TunedBy, Unit, by_unit, mean_of};
+use super::{
+    Adapted, Compare, Driven, Faults, FrontPoint, METRICS, Mean, Metric, TunedBy, Unit, by_unit, mean_of,
+};
 use crate::engine::{Entry, EntryKind, Tables};
 use crate::statistics::{Confidence, p_of_zero};
 
@@ -19,8 +21,8 @@ pub struct LawResult {
     pub name: String,
     /// Its kind, and what is around it.
     pub kind: String,
-    /// Where it is published.
-    pub source: &'static str,
+    /// Where it is published, with "after" where some of it was chosen here.
+    pub source: String,
     /// Its parameters; of an oracle those for the first driver.
     pub values: Vec<(&'static str, f64)>,
     /// Whether it was tuned for each driver by itself.
@@ -43,6 +45,10 @@ pub struct Cell {
     /// How probable so large a difference is where there is none, corrected by Holm's method for all cells and judged metrics; none of a
     /// metric that is not judged by.
     pub p_holm: Vec<Option<f64>>,
+    /// Its drives.
+    pub drives: usize,
+    /// Drives without a value of a metric that others have, metric by metric: means leave them out.
+    pub missing: Vec<usize>,
     /// Drives that left the road.
     pub off_road: usize,
     /// Drives in which the ECU ended guidance by its own decision.
@@ -94,6 +100,8 @@ pub struct CompareResults {
     pub drivers: Vec<[String; 2]>,
     /// Where the gains are published with which each drives without guidance; none if nowhere, and he keeps his own.
     pub by_hand: Vec<Option<&'static str>>,
+    /// K_hg at the beginning of a drive, of the drivers who have one.
+    pub k_hg: Vec<Option<f64>>,
     /// Names of the worlds; one without a name if there are none.
     pub worlds: Vec<String>,
     /// Road and speed of each place in a world.
@@ -115,6 +123,8 @@ pub struct CompareResults {
     pub cells: Vec<Cell>,
     /// By law, then world, then metric, without the first law.
     pub ratios: Vec<Ratio>,
+    /// Where drivers who adapt stand behind their days.
+    pub adapted: Vec<Adapted>,
     /// What each law trades, by law, then peak.
     pub front: Vec<FrontPoint>,
     /// Every judged drive.
@@ -177,6 +187,7 @@ pub(super) fn sum_up(
     tuned: Vec<Tuned>,
     driven: &[Driven],
     front: Vec<FrontPoint>,
+    adapted: Vec<Option<Adapted>>,
 ) -> CompareResults {
     let places = compare.judged.places.len() / compare.worlds.len();
     let Faults {
@@ -194,6 +205,9 @@ pub(super) fn sum_up(
         drivers: (compare.drivers.iter().map(|d| [d.name.clone(), d.kinds()])).collect(),
         by_hand: (compare.by_hand.iter())
             .map(|by_hand| by_hand.as_ref().map(|(_, table)| *table))
+            .collect(),
+        k_hg: (compare.drivers.iter())
+            .map(|driver| driver.untuned_part(&compare.judged.places[0].2).ok()?.k_hg())
             .collect(),
         places: compare
             .judged
@@ -218,6 +232,7 @@ pub(super) fn sum_up(
         instants: [sudden_loss, silent_lane],
         cells: cells(compare, driven),
         ratios: ratios(compare, driven),
+        adapted: adapted.into_iter().flatten().collect(),
         front,
         rows: (driven.iter().enumerate())
             .map(|(number, driven)| drive_row(compare, number, driven))
@@ -225,7 +240,7 @@ pub(super) fn sum_up(
     }
 }
 
-fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
+pub(super) fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
     let (drivers, level) = (compare.drivers.len(), compare.level);
     let each = driven.len() / (compare.laws.len() * drivers);
     let of_cell = |law: usize, driver: usize| &driven[(law * drivers + driver) * each..][..each];
@@ -250,6 +265,8 @@ fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
                 .map(|metric| mean_of(&apart(metric), level))
                 .collect(),
             p_holm: metrics.map(p).collect(),
+            drives: own.len(),
+            missing: (0..METRICS.len()).map(|metric| missing(own, metric)).collect(),
             off_road: own.iter().filter(|d| d.off_road).count(),
             left_by_itself: own.iter().filter(|d| d.left_by_itself).count(),
             failed_off_road: own.iter().map(|d| d.failed_off_road).sum(),
@@ -258,6 +275,15 @@ fn cells(compare: &Compare, driven: &[Driven]) -> Vec<Cell> {
     let mut cells: Vec<Cell> = (0..compare.laws.len() * drivers).map(cell).collect();
     correct(cells.iter_mut().flat_map(|cell| &mut cell.p_holm).collect());
     cells
+}
+
+/// How many drives have no value of a metric; 0 where none has.
+fn missing(drives: &[Driven], metric: usize) -> usize {
+    let without = drives
+        .iter()
+        .filter(|drive| drive.values[metric].is_none())
+        .count();
+    if without == drives.len() { 0 } else { without }
 }
 
 /// Holm's correction of a family, in place.
@@ -352,7 +378,7 @@ fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &boo
     LawResult {
         name: law.name.clone(),
         kind: law.kinds(),
-        source: law.kind.source,
+        source: law.kind.said_source(),
         values: law
             .kind
             .parameters

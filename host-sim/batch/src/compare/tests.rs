@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 
 use haptic_sim::guidance::OwnLaw;
-use haptic_sim::kind::{Kind, Make};
+use haptic_sim::kind::{Kind, Make, Origin};
 use haptic_sim::laws::LawView;
 use haptic_sim::parts::{PaperDriver, PaperVehicle};
 use haptic_sim::scenario::{Failure, FailureKind};
@@ -297,6 +297,55 @@ fn without_guidance_drivers_have_their_gains_by_hand() {
     assert_ne!(own.rows[..4], same.rows[..4]);
 }
 
+/// Six days without a torque leave exp(-6/3) of a share of 1, days with the published law all of it. He is judged with the gains between
+/// tables 5 and 6 that his share has, written here for participant 13; without days he is the participant.
+#[test]
+fn who_adapts_is_judged_where_his_days_left_him() {
+    let adapting = FILE.replacen(
+        "[[driver]]\nkind = 'paper'\n",
+        "[[driver]]\nname = 'he'\nkind = 'adapting'\nnumber = 13\n",
+        1,
+    );
+    let adapting = adapting.replacen(
+        "k_1 = 0.4\naround = [{ kind = 'driver_limit', max_nm = 2 }]",
+        "k_1 = 0",
+        1,
+    );
+    let worlds = "[[world]]\nname = 'before'\ndays = 0\n[[world]]\nname = 'behind'\ndays = 6\n";
+    let found = results(&adapting.replacen("[faults]", &format!("{worlds}[faults]"), 1));
+    let shares: Vec<(usize, usize, usize)> = (found.adapted.iter())
+        .map(|adapted| (adapted.law, adapted.driver, adapted.world))
+        .collect();
+    assert_eq!(shares, [(0, 0, 1), (1, 0, 1)]);
+    let [all, little] = [0, 1].map(|place| found.adapted[place].share);
+    assert!(
+        (all - 1.0).abs() < 1e-12 && (little - (-2.0_f64).exp()).abs() < 1e-12,
+        "{all} {little}"
+    );
+    let between = |manual: f64, guided: f64| manual + little * (guided - manual);
+    let same = format!(
+        "kind = 'paper'\na_1 = {}\na_2 = {}\na_3 = {}\nt_p_s = {}\nk_d_nm_per_rad = {}\nk_hg = {}\n",
+        between(0.074, 0.086),
+        between(0.015, 0.003),
+        between(3.523, 3.476),
+        between(0.038, 0.046),
+        between(3.719, 2.125),
+        between(0.0, 0.035)
+    );
+    let named = |driver: &str| results(&adapting.replacen("kind = 'adapting'\nnumber = 13\n", driver, 1));
+    let (before, behind) = (named("kind = 'participant'\nnumber = 13\n"), named(&same));
+    // By law, driver, place with both worlds, seed.
+    for (law, rows) in [(0, &before), (1, &behind)] {
+        for (own, same) in found.rows[law * 16 + 4..][..4].iter().zip(&rows.rows[law * 8..]) {
+            let [own, same] = [own, same].map(|row| row.driven.values[0].unwrap());
+            assert!((own - same).abs() < 1e-9, "{law}: {own} {same}");
+        }
+    }
+    for (own, same) in found.rows[16..][..4].iter().zip(&before.rows[8..]) {
+        assert_eq!(own.driven, same.driven);
+    }
+}
+
 const DRAWN: &str = "[drawn]\nbends = 2\nspeeds_m_per_s = [14, 20]\nlateral_m_per_s2 = [0.5, 1.5]\n";
 
 fn drawn(seeds: u32) -> String {
@@ -366,6 +415,31 @@ fn what_does_not_scatter_has_no_interval() {
     }
 }
 
+/// One drive of four without a value is counted, a metric that no drive has is not.
+#[test]
+fn drives_without_a_value_are_counted() {
+    let kinds = Kinds::default();
+    let compare = compare(FILE, &kinds).unwrap();
+    let drive = |tlc_s| {
+        let mut values = [Some(1.0); METRICS.len()];
+        (values[3], values[9]) = (tlc_s, None);
+        Driven {
+            values,
+            off_road: false,
+            left_by_itself: false,
+            failed_off_road: 0,
+        }
+    };
+    let mut driven = vec![drive(Some(2.0)); 16];
+    driven[5] = drive(None);
+    let cells = results::cells(&compare, &driven);
+    let missing: Vec<[usize; 3]> = (cells.iter())
+        .map(|cell| [0, 3, 9].map(|metric| cell.missing[metric]))
+        .collect();
+    assert_eq!(missing, [[0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 0]]);
+    assert_eq!(cells[1].drives, 4);
+}
+
 /// A law that no list has, and one that asks for no number.
 #[test]
 fn a_law_of_one_s_own_joins() {
@@ -380,6 +454,7 @@ fn a_law_of_one_s_own_joins() {
     kinds.laws.push(Kind {
         name: "silent",
         source: "this test",
+        origin: Origin::Ours,
         parameters: &[],
         make: Make::Part(|_, _| Ok(Box::new(Silent))),
     });
@@ -405,7 +480,7 @@ fn a_law_of_one_s_own_joins() {
 }
 
 /// What stands in the file, what stands there instead, and what is said of it.
-const WRONG: [(&str, &str, &str); 34] = [
+const WRONG: [(&str, &str, &str); 35] = [
     (
         "k_1 = 0.25",
         "oracle = 1",
@@ -467,6 +542,11 @@ const WRONG: [(&str, &str, &str); 34] = [
         "driver \"paper\" is there twice",
     ),
     ("name = 'short'", "name = 'a/b'", "a name is 1 to 40 letters"),
+    (
+        "seeds = 2",
+        "seeds = 2\ndays = 1001",
+        "days = 1001 is outside 0 to 1000",
+    ),
     ("seeds = 2", "seeds = 0", "seeds = 0 is outside 1 to 1000"),
     ("seeds = 2", "seeds = -2", "expected a whole number, 0 or more"),
     ("seeds = 2", "seedz = 2", "unknown field `seedz`"),

@@ -7,7 +7,7 @@ use std::ops::Range;
 use serde::Serialize;
 
 use super::{
-    Compare, Confidence, Driven, Faults, METRICS, Mean, Set, StudyError, Tuning, Watch, by_unit, mean_of,
+    Compare, Confidence, Driven, METRICS, Mean, Set, Stage, StudyError, Tuning, Watch, by_unit, mean_of,
 };
 use crate::metrics::TRADED;
 use crate::sobol::Dimension;
@@ -205,7 +205,7 @@ pub(super) fn tune(compare: &Compare, watch: &Watch<'_>) -> Result<Vec<Tuned>, S
             if sets.is_empty() {
                 break;
             }
-            let driven = compare.drive(&sets, &tuning.drives, "tuning", Faults::default(), watch)?;
+            let driven = compare.drive(&sets, Stage::Tuning(&tuning.drives), watch)?;
             let mut rest = &driven[..];
             for (search, sets) in searches.iter_mut().zip(rounds) {
                 let (own, behind) = rest.split_at(sets.len() * search.drivers.len() * of_set);

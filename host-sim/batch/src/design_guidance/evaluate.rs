@@ -35,6 +35,9 @@ pub struct Evaluated {
     pub gains: Gains,
     /// Driver by driver.
     pub drivers: Vec<Figures>,
+    /// The figures of each seed, driver by driver; none of the drives of the search.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub draws: Vec<Vec<Figures>>,
     /// Drivers at speeds at which the loop is unstable and with the paper's gains is not.
     pub unstable: u32,
 }
@@ -121,13 +124,20 @@ impl DesignGuidance {
             |_, scenario, run| Ok(figures(scenario, run)),
         )?;
         let each = found.len() / stage.drivers.len();
+        let losses = stage.losses as usize;
+        let draw = |number: usize| -> Vec<Figures> {
+            let of_driver = |runs: &[Figures]| {
+                let drives = runs.chunks(1 + losses).skip(number).step_by(stage.seeds as usize);
+                mean(&drives.collect::<Vec<_>>().concat(), losses)
+            };
+            found.chunks(each).map(of_driver).collect()
+        };
+        let draws = if held_out { stage.seeds as usize } else { 0 };
         Ok(Evaluated {
             held_out,
             gains,
-            drivers: found
-                .chunks(each)
-                .map(|runs| mean(runs, stage.losses as usize))
-                .collect(),
+            drivers: found.chunks(each).map(|runs| mean(runs, losses)).collect(),
+            draws: (0..draws).map(draw).collect(),
             unstable: self.unstable(gains, stage)?,
         })
     }

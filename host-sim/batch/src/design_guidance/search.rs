@@ -8,7 +8,7 @@ use super::evaluate::{CONFLICT, EFFORT, LOSS, NOISE, PEAK};
 use super::{DesignGuidance, Evaluated, Figures, Gains, Member, Stage, published};
 use crate::engine::Watch;
 use crate::error::StudyError;
-use crate::statistics::front;
+use crate::statistics::{Confidence, Mean, front, mean};
 
 /// What a set is held to: a figure over that of the paper's gains.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -71,8 +71,8 @@ pub struct Choice {
     pub stretch: [Option<f64>; 2],
     /// On the training drives.
     pub training: SetRow,
-    /// The ratios on the held-out drives.
-    pub held_out: [f64; BARS.len()],
+    /// The ratios on the held-out drives, with intervals over the draws of their noise; none where there is one draw.
+    pub held_out: [Mean; BARS.len()],
     /// Driver by driver there.
     pub drivers: Vec<Figures>,
 }
@@ -140,7 +140,7 @@ impl DesignGuidance {
             Ok(Choice {
                 stretch: stretch.map(|stretch| stretch.is_finite().then_some(stretch)),
                 training,
-                held_out: self.row_of(&judged, &published).ratios,
+                held_out: self.judged(&judged, &published),
                 drivers: judged.drivers,
             })
         };
@@ -233,6 +233,37 @@ impl DesignGuidance {
         goals + BEYOND * beyond + f64::from(row.unstable)
     }
 
+    /// The ratios of held-out drives. Their intervals are Tukey's: each draw is left out in turn, for a ratio of means is no mean of ratios.
+    pub(super) fn judged(&self, set: &Evaluated, paper: &Evaluated) -> [Mean; BARS.len()] {
+        let drivers = &self.stages[1].drivers;
+        let whole = ratios(&set.drivers, &paper.drivers, drivers);
+        let without = |left_out: usize| {
+            let [own, other] = [set, paper].map(|of| means_without(&of.draws, left_out));
+            ratios(&own, &other, drivers)
+        };
+        let count = set.draws.len();
+        let left: Vec<[f64; BARS.len()]> = match count {
+            0 | 1 => Vec::new(),
+            _ => (0..count).map(without).collect(),
+        };
+        std::array::from_fn(|bar| {
+            let whole = whole[bar];
+            let pseudo = left
+                .iter()
+                .map(|left| whole + (count as f64 - 1.0) * (whole - left[bar]));
+            let found = Mean::new(&pseudo.collect::<Vec<_>>(), Confidence::USUAL);
+            let centred = |[low, high]: [f64; 2]| {
+                let half = 0.5 * (high - low);
+                [whole - half, whole + half]
+            };
+            Mean {
+                mean: whole,
+                interval: found.and_then(|found| found.interval).map(centred),
+                level: Confidence::USUAL,
+            }
+        })
+    }
+
     fn row_of(&self, set: &Evaluated, paper: &Evaluated) -> SetRow {
         let drivers = &self.stages[usize::from(set.held_out)].drivers;
         SetRow {
@@ -242,6 +273,17 @@ impl DesignGuidance {
             on_front: false,
         }
     }
+}
+
+/// Driver by driver, the means of all draws but one.
+fn means_without(draws: &[Vec<Figures>], left_out: usize) -> Vec<Figures> {
+    let kept: Vec<&Vec<Figures>> = (draws.iter().enumerate())
+        .filter_map(|(number, draw)| (number != left_out).then_some(draw))
+        .collect();
+    let of_driver = |driver: usize| {
+        std::array::from_fn(|figure| mean(kept.iter().map(|draw| draw[driver][figure])).unwrap_or(f64::NAN))
+    };
+    (0..draws[0].len()).map(of_driver).collect()
 }
 
 /// Four digits: what a file says is what was driven.

@@ -70,6 +70,31 @@ fn ratios_are_those_of_sums_by_hand() {
     assert!((ratios(&set, &paper, &nobody)[4] - 2.0).abs() < 1e-12);
 }
 
+/// Where the paper's figures do not scatter, the ratio is a mean of the draws' ratios 0.4, 0.6 and 0.8, with Student's interval of two degrees
+/// of freedom: 4.302653*0.2/sqrt(3). A single draw tells none.
+#[test]
+fn held_out_ratios_have_the_interval_of_their_draws() {
+    let design = design(FILE).unwrap();
+    let evaluated = |peaks_m: &[f64]| {
+        let figures = |peak_m: f64| vec![[peak_m, 0.2, 0.1, 1.0, 0.5]; 2];
+        Evaluated {
+            held_out: true,
+            gains: published(),
+            drivers: figures(peaks_m.iter().sum::<f64>() / peaks_m.len() as f64),
+            draws: peaks_m.iter().map(|peak_m| figures(*peak_m)).collect(),
+            unstable: 0,
+        }
+    };
+    let found = design.judged(&evaluated(&[0.2, 0.4, 0.3]), &evaluated(&[0.5; 3]));
+    let [low, high] = found[0].interval.unwrap();
+    assert!((found[0].mean - 0.6).abs() < 1e-12, "{found:?}");
+    for half in [high - 0.6, 0.6 - low] {
+        assert!((half - 0.496_827_6).abs() < 1e-6, "{half}");
+    }
+    let alone = design.judged(&evaluated(&[0.2]), &evaluated(&[0.5]));
+    assert_eq!((alone[0].mean, alone[0].interval), (0.4, None));
+}
+
 #[test]
 fn held_out_drives_have_other_seeds_and_other_drivers_with_lines() {
     let text = FILE

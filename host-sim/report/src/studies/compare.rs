@@ -30,7 +30,10 @@ pub fn report(results: &CompareResults) -> Report {
     });
     let first = &results.laws[0].name;
     let verdicts = vec![Block::Text(judgement(results)), Block::Table(worse(results))];
-    let of_all = vec![Block::Table(ratios(results))];
+    let mut of_all = vec![Block::Table(ratios(results))];
+    if !results.adapted.is_empty() {
+        of_all.push(Block::Table(adapted(results)));
+    }
     let front = vec![
         Block::figure("front", front_figure(results), front_caption(results)),
         Block::Table(front_table(results)),
@@ -100,7 +103,7 @@ fn kind<P: ?Sized>(kind: &Kind<P>) -> [String; 3] {
     let parameters: Vec<String> = parameters.collect();
     [
         format!("`{}`", kind.name),
-        kind.source.into(),
+        kind.said_source(),
         parameters.join(", "),
     ]
 }
@@ -133,7 +136,9 @@ fn notes(results: &CompareResults) -> Vec<String> {
     counts
         .chain(unsettled(results))
         .chain(by_hand(results))
+        .chain(free(results))
         .chain(unsaid(results))
+        .chain(missing(results))
         .collect()
 }
 
@@ -171,6 +176,19 @@ fn by_hand(results: &CompareResults) -> Option<String> {
     ))
 }
 
+/// Drivers whom it costs nothing to resist.
+fn free(results: &CompareResults) -> Option<String> {
+    let drivers = results.drivers.iter().zip(&results.k_hg);
+    let free = drivers.filter(|(_, k_hg)| k_hg.is_none_or(|k_hg| k_hg == 0.0));
+    let free: Vec<&str> = free.map(|([name, _], _)| name.as_str()).collect();
+    (!free.is_empty()).then(|| {
+        format!(
+            "drivers without a K_hg, or with 0, whose model lets resistance be free (T_d is what is left after T_h): {}",
+            free.join(", ")
+        )
+    })
+}
+
 /// Means that have no interval, and are not shown.
 fn unsaid(results: &CompareResults) -> Option<String> {
     let values = results.cells.iter().flat_map(|pair| &pair.values).flatten();
@@ -180,6 +198,32 @@ fn unsaid(results: &CompareResults) -> Option<String> {
         _ => "nothing in them was drawn by chance, or they are the same in every draw",
     };
     (count > 0).then(|| format!("{count} means have no interval, and are not shown: {why}"))
+}
+
+/// Drives that a mean of some of its drives passes over.
+fn missing(results: &CompareResults) -> Option<String> {
+    let places = 0..results.metrics.len();
+    let of_pair = |pair: &Pair| {
+        let told = places
+            .clone()
+            .filter(|place| pair.missing[*place] > 0)
+            .map(|place| {
+                let (law, driver) = (&results.laws[pair.law].name, &results.drivers[pair.driver][0]);
+                let label = results.metrics[place].label;
+                format!(
+                    "{label} of {law} with {driver} ({} of {})",
+                    pair.missing[place], pair.drives
+                )
+            });
+        told.collect::<Vec<String>>()
+    };
+    let told: Vec<String> = results.cells.iter().flat_map(of_pair).collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "drives without a value, which the means leave out: {}",
+            told.join(", ")
+        )
+    })
 }
 
 /// A mean with half its interval; a dash for one without.
@@ -200,7 +244,7 @@ fn laws(results: &CompareResults) -> Table {
         [
             ("Law", Cell::text(&law.name)),
             ("Kind", Cell::text(&law.kind)),
-            ("Source", Cell::text(law.source)),
+            ("Source", Cell::text(&law.source)),
             (
                 "Sets",
                 Cell::number(tuning.map(|tuning| f64::from(tuning.sets)), 0),
@@ -257,6 +301,28 @@ fn ratios(results: &CompareResults) -> Table {
         results.laws[0].name, results.units[1], results.units[0]
     );
     Table::new(caption, columns, pairs.map(row))
+}
+
+/// Where drivers who adapt stand behind their days.
+fn adapted(results: &CompareResults) -> Table {
+    let pairs =
+        (0..results.laws.len()).flat_map(|law| (0..results.worlds.len()).map(move |world| (law, world)));
+    let row = |(law, world): (usize, usize)| {
+        let own = results
+            .adapted
+            .iter()
+            .filter(|own| (own.law, own.world) == (law, world));
+        let shares: Vec<f64> = own.map(|own| own.share).collect();
+        let end = |end: fn(f64, f64) -> f64| Cell::number(shares.iter().copied().reduce(end), 3);
+        let head = [&results.laws[law].name, &results.worlds[world]].map(Cell::text);
+        (!shares.is_empty()).then(|| head.into_iter().chain([end(f64::min), end(f64::max)]).collect())
+    };
+    let caption = "Drivers who adapt: the share of their guided gains behind their days, 1 with those of table 6, 0 with those of table 5";
+    Table::new(
+        caption,
+        ["Law", "World", "Least", "Largest"],
+        pairs.filter_map(row),
+    )
 }
 
 /// Whether a probability, corrected, is below what the level leaves.

@@ -1,8 +1,9 @@
 //! What a design of guidance shows: the front to choose from, the sets to choose, what each costs on drives that the search has not seen.
 
-use super::listed;
+use super::{listed, with_interval};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Series};
+use haptic_batch::Mean;
 use haptic_batch::design_guidance::{Bar, Choice, DesignResults, Figures, Gains, Member, SetRow, Stage};
 
 /// The document of a design; `chosen` is the row of its choice, from 0.
@@ -13,18 +14,17 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
         true => "the drivers with lines of their own",
         false => "all drivers, as none has a line of its own",
     };
-    let held_out = "To choose from: held-out drives, over the paper's gains";
-    let searched = "The same on the drives of the search";
     let choose = vec![
         Block::figure(
             "front",
             figure(results, choice),
             "Sets that the search tried, on its own drives, over the paper's gains. On the front no other set is better in all three.",
         ),
-        Block::Table(choices(results, held_out, |c| c.held_out)),
-        Block::Table(choices(results, searched, |c| c.training.ratios)),
+        Block::Table(choices(results)),
         Block::Text(format!(
-            "Effort and conflict are those of {whose}. Loss x and Others x: how many times as far as its bars allow the search let a set go."
+            "Intervals of 95 % are over {} draws of the noise: the road, the speed and the drivers are those of the file. Effort and conflict are \
+             those of {whose}. Loss x and Others x: how many times as far as its bars allow the search let a set go.",
+            results.stages[1].seeds
         )),
     ];
     let row = vec![
@@ -44,24 +44,41 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
 fn what_holds(results: &DesignResults, choice: &Choice) -> String {
     let bars = &results.bars;
     let is_over = |(ratio, bar): (&f64, &Bar)| *ratio > bar.limit;
+    let is_missed = |(ratio, bar): &(&Mean, &Bar)| is_held(ratio, bar) == Some(false);
     let holding = results
         .sets
         .iter()
         .filter(|set| set.unstable == 0 && !set.ratios.iter().zip(bars).any(is_over));
-    let missed = choice.held_out.iter().zip(bars).filter(|&pair| is_over(pair));
-    let missed: Vec<String> = missed
-        .map(|(ratio, bar)| format!("{} {ratio:.3} (at most {})", bar.label, bar.limit))
+    let said = |(ratio, bar): (&Mean, &Bar)| format!("{} {ratio} (at most {})", bar.label, bar.limit);
+    let judged = || choice.held_out.iter().zip(bars);
+    let missed: Vec<String> = judged().filter(is_missed).map(said).collect();
+    let open: Vec<String> = judged()
+        .filter(|(ratio, bar)| is_held(ratio, bar).is_none())
+        .map(said)
         .collect();
     let search = match holding.count() {
         0 => "The bars cannot be had together with any set that was tried".to_owned(),
         sets => format!("{sets} of the sets tried hold every bar on the drives of the search"),
     };
-    let chosen = if missed.is_empty() {
-        "holds every bar".into()
+    let mut chosen = if missed.is_empty() {
+        "is not seen to miss a bar".into()
     } else {
         format!("misses {}", missed.join(", "))
     };
+    if !open.is_empty() {
+        chosen += &format!("; its draws do not tell whether it holds {}", open.join(", "));
+    }
     format!("On the held-out drives the chosen row {chosen}. {search}.")
+}
+
+/// Whether a ratio is within its bar; none where its interval does not tell, or where it has none.
+fn is_held(ratio: &Mean, bar: &Bar) -> Option<bool> {
+    let [low, high] = ratio.interval?;
+    match () {
+        () if high <= bar.limit => Some(true),
+        () if low > bar.limit => Some(false),
+        () => None,
+    }
 }
 
 /// A scenario file with the gains of a row.
@@ -114,24 +131,28 @@ fn figure(results: &DesignResults, choice: &Choice) -> Figure {
     x.figure([panel("Mean peak error", 0), panel("Mean loss", 2)])
 }
 
-fn choices<const N: usize>(
-    results: &DesignResults,
-    caption: &str,
-    ratios: impl Fn(&Choice) -> [f64; N],
-) -> Table {
+fn choices(results: &DesignResults) -> Table {
     let row = |(number, choice): (usize, &Choice)| {
         let stretch =
             |place: usize| choice.stretch[place].map_or("any".into(), |stretch| stretch.to_string());
         let gains = gains(&choice.training.gains);
         let head = [(number + 1).to_string(), stretch(0), stretch(1), gains].map(Cell::Text);
-        let ratios = ratios(choice).map(|ratio| Cell::number(ratio, 3));
+        let ratios = choice.held_out.iter().map(said);
         head.into_iter().chain(ratios).collect()
     };
     let bars = results.bars.iter().map(|bar| bar.label);
     let columns = ["Row", "Loss x", "Others x", "a_1' to a_4'"]
         .into_iter()
         .chain(bars);
+    let caption = "To choose from: held-out drives, over the paper's gains";
     Table::new(caption, columns, results.choices.iter().enumerate().map(row))
+}
+
+/// A ratio with its interval; a dash without one.
+fn said(ratio: &Mean) -> Cell {
+    Cell::Text(with_interval(
+        Some(ratio).filter(|ratio| ratio.interval.is_some()),
+    ))
 }
 
 fn gains(gains: &Gains) -> String {
@@ -140,16 +161,13 @@ fn gains(gains: &Gains) -> String {
 
 fn bars(results: &DesignResults, choice: &Choice) -> Table {
     let row = |(place, bar): (usize, &Bar)| {
-        let (training, held_out) = (choice.training.ratios[place], choice.held_out[place]);
+        let held_out = &choice.held_out[place];
+        let is_held = is_held(held_out, bar).map_or("not told", |is| if is { "yes" } else { "no" });
         [
             ("Figure", Cell::text(bar.label)),
             ("At most", Cell::number(bar.limit, 2)),
-            ("Search", Cell::number(training, 3)),
-            ("Held out", Cell::number(held_out, 3)),
-            (
-                "Held",
-                Cell::text(if held_out <= bar.limit { "yes" } else { "no" }),
-            ),
+            ("Held out", said(held_out)),
+            ("Held", Cell::text(is_held)),
         ]
     };
     let caption = "What it is held to, over the paper's gains";

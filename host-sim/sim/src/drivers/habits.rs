@@ -18,7 +18,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::{AnyDriver, Kind, Make};
 use crate::guidance::LaneErrors;
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 use crate::laws::weight;
 use crate::models::{STEP_S, step_of};
 use crate::parts::{Driver, DriverView};
@@ -204,6 +204,7 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
     Kind {
         name: "own_line",
         source: "ours",
+        origin: Origin::Ours,
         parameters: &[
             Parameter::ours("offset_m", 0.3, [-2.0, 2.0]),
             Parameter::ours("cut_m2", 0.0, [-500.0, 500.0]),
@@ -212,7 +213,8 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
     },
     Kind {
         name: "trust",
-        source: "ours; Nikolaidis et al. 2017",
+        source: "Nikolaidis et al. 2017",
+        origin: Origin::After,
         parameters: &[
             Parameter::ours("k_hg", 0.5, [0.0, 1.0]),
             Parameter::ours("g_c", 0.5, [0.0, 5.0]),
@@ -225,6 +227,7 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
     Kind {
         name: "tiring",
         source: "ours",
+        origin: Origin::Ours,
         parameters: &[
             Parameter::ours("delay_s", 0.3, [0.0, 2.0]),
             Parameter::ours("loss", 0.3, [0.0, 1.0]),
@@ -235,6 +238,7 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
     Kind {
         name: "lapses",
         source: "ours",
+        origin: Origin::Ours,
         parameters: &[
             Parameter::ours("every_s", 30.0, [0.1, 100_000.0]),
             Parameter::ours("lasts_s", 2.0, [0.0, 60.0]),
@@ -244,12 +248,14 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
     Kind {
         name: "warning",
         source: "ours",
+        origin: Origin::Ours,
         parameters: &[Parameter::ours("answers", 1.0, [0.0, 1.0])],
         make: Make::Around(warning),
     },
     Kind {
         name: "stiffening",
         source: "ours",
+        origin: Origin::Ours,
         parameters: &[
             Parameter::ours("stiffness_nm_per_rad", 10.0, [0.0, 100.0]),
             Parameter::ours("damping_nm_s_per_rad", 0.5, [0.0, 10.0]),

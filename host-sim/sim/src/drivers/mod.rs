@@ -14,7 +14,7 @@ mod two_point;
 use crate::kind::{Kind, Make};
 use crate::models::driver::Remnant;
 use crate::parts::{Driver, DriverView};
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::Scenario;
 use crate::seeds::Stream;
 
 /// A driver behind a pointer that can be copied; every driver that is `Clone` is one.
@@ -50,10 +50,12 @@ impl Driver for Box<dyn AnyDriver> {
 }
 
 /// Every driver here.
-pub const DRIVERS: [Kind<dyn AnyDriver>; 5] = [
+pub const DRIVERS: [Kind<dyn AnyDriver>; 7] = [
     paper::KIND,
     paper::PARTICIPANT,
+    paper::ADAPTING,
     cybernetic::KIND,
+    cybernetic::CURVATURE,
     two_point::KIND,
     relay::KIND,
 ];
@@ -61,7 +63,7 @@ pub const DRIVERS: [Kind<dyn AnyDriver>; 5] = [
 /// Every habit: what may be put around any driver.
 pub const HABITS: [Kind<dyn AnyDriver>; 6] = habits::KINDS;
 
-/// A driver with the remnant of its scenario added.
+/// A driver with the remnant that its scenario asks for added.
 #[derive(Debug, Clone)]
 struct WithRemnant<D>(D, Remnant);
 
@@ -90,12 +92,11 @@ fn angles_of_sight(view: &DriverView, near_s: f64) -> [f64; 2] {
     [near, 0.5 * view.lane.e_theta_rad]
 }
 
-/// A driver of a scenario whose remnant it has.
-#[allow(clippy::unnecessary_wraps, reason = "the type of Make::Part")]
-fn of_scenario(
+/// A driver, also one of one's own, with the remnant that a scenario asks for; [`PaperDriver`](crate::parts::PaperDriver) has it already.
+pub fn with_remnant(
     scenario: &Scenario,
     driver: impl Driver + Clone + Send + Sync + 'static,
-) -> Result<Box<dyn AnyDriver>, ScenarioError> {
+) -> Box<dyn AnyDriver> {
     let remnant = Remnant::new(scenario.driver(), Stream::Remnant.seed(scenario.seed()));
-    Ok(Box::new(WithRemnant(driver, remnant)))
+    Box::new(WithRemnant(driver, remnant))
 }

@@ -1,8 +1,11 @@
 //! The paper's driver, (7) and (8), with parameters of a file's own, or those of a participant of table 6. Source: Wang, Zheng,
 //! Nacpil and Nakano 2022.
+//!
+//! *Adapting*: every value between those of a participant by hand (table 5, share 0) and with guidance (table 6, share 1). A comparison moves
+//! the share over days; in a drive it stays. Ours: that the way between the two is straight, and how many days it takes.
 
 use super::{AnyDriver, Kind, Make};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::participants::participants;
 use crate::parts::PaperDriver;
@@ -28,6 +31,7 @@ fn boxed(
 pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
     name: "paper",
     source: "Wang et al. 2022, (7) (8), table 7",
+    origin: Origin::Published,
     parameters: &[
         Parameter::published("a_1", 0.1, [0.0, 10.0]),
         Parameter::published("a_2", 0.05, [0.0, 10.0]),
@@ -58,11 +62,28 @@ pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
 pub(super) const PARTICIPANT: Kind<dyn AnyDriver> = Kind {
     name: "participant",
     source: "Wang et al. 2022, table 6",
-    parameters: &[Parameter::published("number", 1.0, [1.0, 14.0])],
-    make: Make::Part(|scenario, v| {
-        let all = participants();
-        let number = v[0].round() as usize;
-        let guided = all[number.clamp(1, all.len()) - 1].guided;
-        boxed(scenario, guided.parameters(), guided.gains())
-    }),
+    origin: Origin::Published,
+    parameters: &[NUMBER],
+    make: Make::Part(|scenario, v| participant(scenario, v[0], 1.0)),
 };
+
+pub(super) const ADAPTING: Kind<dyn AnyDriver> = Kind {
+    name: "adapting",
+    source: "Wang et al. 2022, tables 5 and 6",
+    origin: Origin::After,
+    parameters: &[
+        NUMBER,
+        Parameter::ours("share", 1.0, [0.0, 1.0]),
+        Parameter::ours("days", 3.0, [0.1, 1000.0]),
+    ],
+    make: Make::Part(|scenario, v| participant(scenario, v[0], v[1])),
+};
+
+const NUMBER: Parameter = Parameter::published("number", 1.0, [1.0, 14.0]);
+
+fn participant(scenario: &Scenario, number: f64, share: f64) -> Result<Box<dyn AnyDriver>, ScenarioError> {
+    let all = participants();
+    let number = (number.round() as usize).clamp(1, all.len());
+    let own = all[number - 1].between(share);
+    boxed(scenario, own.parameters(), own.gains())
+}

@@ -4,8 +4,8 @@
 //!
 //! Chosen here: d is the wheel angle, T_a the guidance torque felt, and d_h the target angle of (7) with driver 1's weights.
 
-use super::{AnyDriver, Kind, Make, of_scenario};
-use crate::kind::Parameter;
+use super::{AnyDriver, Kind, Make, with_remnant};
+use crate::kind::{Origin, Parameter};
 use crate::models::driver::{DriverParameters, Vision};
 use crate::parts::{Driver, DriverView};
 
@@ -38,6 +38,7 @@ impl Driver for Relay {
 pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
     name: "relay",
     source: "Ersal's cognitive driver (Simulink)",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("threshold_rad", 0.000_75, [0.0, 0.1]),
         Parameter::published("stiffness_nm_per_rad", 12.5, [0.0, 50.0]),
@@ -49,7 +50,7 @@ pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
             t_p: v[3],
             ..*scenario.driver()
         };
-        of_scenario(
+        Ok(with_remnant(
             scenario,
             Relay {
                 look_ahead_s: [driver.t_n, driver.t_f],
@@ -58,6 +59,6 @@ pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
                 stiffness: v[1],
                 limit_nm: v[2],
             },
-        )
+        ))
     }),
 };

@@ -123,6 +123,53 @@ fn drivers_answer_as_a_program_from_their_equations_does() {
     }
 }
 
+/// The program's far angle is 15/300, that of an arc of 300 m to the left; on a straight it is 0, and what is left answers alike to both
+/// sides.
+#[test]
+fn the_far_angle_may_be_that_of_the_curvature() {
+    let scenario = Scenario::default();
+    let road = scenario.course().centreline();
+    let arc_m = (0..3000)
+        .map(f64::from)
+        .find(|s_m| (road.at(*s_m).1 - 1.0 / 300.0).abs() < 1e-12);
+    let torques = |far_m: f64, side: f64| -> Vec<f64> {
+        let mut driver = driver(&scenario, "cybernetic_curvature", &[("k_hg", 0.25)]);
+        let answer = |step| {
+            let mut seen = view(step);
+            seen.points_m[1] = far_m;
+            (seen.lane.e_y_m, seen.wheel_angle_rad) = (side * seen.lane.e_y_m, side * seen.wheel_angle_rad);
+            seen.guidance_torque_nm *= side;
+            driver.step(&seen)
+        };
+        (0..=10_000).map(answer).skip(1000).step_by(1000).collect()
+    };
+    let left = torques(arc_m.unwrap(), 1.0);
+    let expected = "6.31042363 5.82208664 3.92043833 2.39282484 2.67372488 4.7683688 7.18420525 8.02987215 6.49329701 3.5615268";
+    let expected = expected.split(' ').map(|text| text.parse::<f64>().unwrap());
+    for (found, wanted) in left.iter().zip(expected) {
+        assert!((found - wanted).abs() < 1e-2, "{found} {wanted}");
+    }
+    let [one, other] = [1.0, -1.0].map(|side| torques(0.0, side));
+    assert!(one.iter().zip(&other).all(|(one, other)| *one == -other));
+}
+
+/// A driver of one's own who does nothing has the remnant of a scenario that asks for one, and no other torque.
+#[test]
+fn a_driver_of_ones_own_has_the_remnant_that_a_scenario_asks_for() {
+    let nobody = || Given(|_| 0.0);
+    let mut quiet = with_remnant(&Scenario::default(), nobody());
+    assert!((0..1000).all(|step| quiet.step(&view(step)) == 0.0));
+    let noisy = crate::models::driver::DriverParameters {
+        remnant_sd_nm: 0.1,
+        ..Default::default()
+    };
+    let scenario = Scenario::builder().driver(noisy).build().unwrap();
+    let mut own = with_remnant(&scenario, nobody());
+    // 1000 s hold some 1500 independent values: the variance is known to 4 %.
+    let square: f64 = (0..1_000_000).map(|step| own.step(&view(step)).powi(2)).sum();
+    assert!((square / 1e6 / 0.01 - 1.0).abs() < 0.15, "{square}");
+}
+
 /// The arc of the first curve has a radius of 300 m, to the left or right: 0.3 m beside the middle, and 60/300 m inside.
 #[test]
 fn an_own_line_lies_beside_the_middle_and_inside_of_curves() {
@@ -221,6 +268,33 @@ fn published_drivers_are_those_of_the_simulator() {
     for step in 0..3000 {
         assert_eq!(thirteen.step(&view(step)), expected.step(&view(step)));
     }
+}
+
+/// Participant 13 at his ends is the driver of table 6 and that of table 5, in the middle he has their means: written here.
+#[test]
+fn who_adapts_lies_between_the_tables() {
+    let scenario = Scenario::default();
+    for (share, same, values) in [
+        (1.0, "participant", vec![("number", 13.0)]),
+        (0.0, "paper", paper_of([0.074, 0.015, 3.523, 0.038, 3.719, 0.0])),
+        (
+            0.5,
+            "paper",
+            paper_of([0.080, 0.009, 3.4995, 0.042, 2.922, 0.0175]),
+        ),
+    ] {
+        let mut own = driver(&scenario, "adapting", &[("number", 13.0), ("share", share)]);
+        let mut same = driver(&scenario, same, &values);
+        for step in 0..3000 {
+            let apart_nm = own.step(&view(step)) - same.step(&view(step));
+            assert!(apart_nm.abs() < 1e-12, "{share} {step} {apart_nm}");
+        }
+    }
+}
+
+fn paper_of(values: [f64; 6]) -> Vec<(&'static str, f64)> {
+    let names = ["a_1", "a_2", "a_3", "t_p_s", "k_d_nm_per_rad", "k_hg"];
+    names.into_iter().zip(values).collect()
 }
 
 /// All drivers with their defaults keep the lane of the paper's course, each habit around the paper's driver too. The

@@ -5,8 +5,8 @@
 //! Chosen here: the angles of sight are `phi_n = e_y/(v*t_n)` and `phi_f = e_theta/2`; the gains are those of the paper's driver 1, as
 //! angles of sight at 60 km/h; the arm is the paper's, (8).
 
-use super::{AnyDriver, Kind, Make, angles_of_sight, of_scenario};
-use crate::kind::Parameter;
+use super::{AnyDriver, Kind, Make, angles_of_sight, with_remnant};
+use crate::kind::{Origin, Parameter};
 use crate::models::STEP_S;
 use crate::models::arm::Arm;
 use crate::models::driver::ArmGains;
@@ -39,11 +39,16 @@ impl Driver for TwoPoint {
         self.arm
             .step(target_rad, view.wheel_angle_rad, view.guidance_torque_nm)
     }
+
+    fn k_hg(&self) -> Option<f64> {
+        Some(self.arm.gains.k_hg)
+    }
 }
 
 pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
     name: "two_point",
     source: "Salvucci and Gray 2004; Mai et al. 2024",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("t_near_s", 0.37, [0.05, 2.0]),
         Parameter::published("t_far_s", 0.9, [0.1, 5.0]),
@@ -56,7 +61,7 @@ pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
     ],
     make: Make::Part(|scenario, v| {
         let driver = scenario.driver();
-        of_scenario(
+        Ok(with_remnant(
             scenario,
             TwoPoint {
                 look_ahead_s: [v[0], v[1]],
@@ -74,6 +79,6 @@ pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
                     },
                 ),
             },
-        )
+        ))
     }),
 };

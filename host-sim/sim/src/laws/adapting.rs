@@ -17,7 +17,7 @@
 //! show what such a gain and a driver whose K_hg follows the guidance do to each other.
 
 use super::{Gains, Kind, Law, LawView, Make, boxed, weight};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 use crate::models::STEP_S;
 
 #[derive(Debug, Clone)]
@@ -169,6 +169,7 @@ impl Law for ByReliance {
 pub(super) const ACTIVITY: Kind<dyn Law> = Kind {
     name: "driver_activity",
     source: "Nguyen et al. 2021; Saito et al. (abstracts)",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("k_1", 0.25, [0.0, 4.0]).tuned(0.25, 0.45),
         Parameter::ours("lambda_min", 0.3, [0.0, 1.0]).tuned(0.0, 1.0),
@@ -191,6 +192,7 @@ pub(super) const ACTIVITY: Kind<dyn Law> = Kind {
 pub(super) const RUNNING_WIDE: Kind<dyn Law> = Kind {
     name: "running_wide",
     source: "ours",
+    origin: Origin::Ours,
     parameters: &[
         Parameter::ours("rate_nm_per_m_s", 0.02, [0.0, 1.0]).tuned(0.005, 0.05),
         Parameter::ours("forgets_s", 200.0, [1.0, 10_000.0]).tuned(50.0, 500.0),
@@ -207,6 +209,7 @@ pub(super) const RUNNING_WIDE: Kind<dyn Law> = Kind {
 pub(super) const BY_RELIANCE: Kind<dyn Law> = Kind {
     name: "by_reliance",
     source: "ours",
+    origin: Origin::Ours,
     parameters: &[
         Parameter::ours("scale", 1.0, [0.0, 2.0]).tuned(0.5, 1.5),
         Parameter::ours("rate_nm_per_s", 0.05, [0.0, 1.0]),
@@ -220,6 +223,7 @@ pub(super) const BY_RELIANCE: Kind<dyn Law> = Kind {
 pub(super) const COMPENSATING: Kind<dyn Law> = Kind {
     name: "compensating",
     source: "ours",
+    origin: Origin::Ours,
     parameters: &[
         Parameter::ours("c_nm", 0.19, [0.0, 1.0]),
         Parameter::ours("least_nm", 0.25, [0.0, 4.0]),
@@ -232,6 +236,7 @@ pub(super) const COMPENSATING: Kind<dyn Law> = Kind {
 pub(super) const LINEAR: Kind<dyn Law> = Kind {
     name: "linear",
     source: "ours",
+    origin: Origin::Ours,
     parameters: &[
         Parameter::ours("k_1", 0.36, [0.0, 4.0]),
         Parameter::ours("slope_nm", -0.4, [-10.0, 10.0]),

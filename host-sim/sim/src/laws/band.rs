@@ -2,7 +2,7 @@
 //! and 2020, of which descriptions were seen: 0.5 m in a car; 0.4 m and 0.15 m in a truck, whose ratio the inner default has.
 
 use super::{Gains, Kind, Law, LawView, Make, boxed};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 
 #[derive(Debug, Clone)]
 struct Band {
@@ -23,6 +23,7 @@ impl Law for Band {
 pub(super) const KIND: Kind<dyn Law> = Kind {
     name: "band",
     source: "Petermeijer et al. 2015, 2020 (descriptions)",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("outer_m", 0.5, [0.0, 2.0]).tuned(0.1, 0.5),
         Parameter::ours("inner_m", 0.19, [0.0, 2.0]),

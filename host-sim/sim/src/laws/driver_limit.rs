@@ -4,10 +4,12 @@
 //! `min(max(L, 0) + up, max(L - down, max(MAX + (ALLOWANCE + T_d+)*FACTOR, 0)))`, and within MAX. There a torque outside is refused;
 //! chosen here: it becomes the nearest that is allowed.
 //!
-//! Defaults are those of Volkswagen's MQB in that repository: 50 commands a second, 0.01 N.m a count, six samples of the driver.
+//! Defaults are those of Volkswagen's MQB in that repository: 50 commands a second, 0.01 N.m a count, six samples of the driver, of which
+//! its torque sensor sends 100 a second.
 
 use super::{Kind, Law, LawView, Make};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
+use crate::models::step_of;
 
 /// The numbers of the rule, in any unit of torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,8 +45,8 @@ impl Limits {
 }
 
 /// Steps from one command to the next.
-const PERIOD_STEPS: u32 = 20;
-/// Samples of the driver that count, one for each command.
+const COMMAND_STEPS: u32 = 20;
+/// Samples of the driver that count.
 const SAMPLES: usize = 6;
 
 /// A law under the rule.
@@ -52,16 +54,20 @@ const SAMPLES: usize = 6;
 pub struct DriverLimit {
     law: Box<dyn Law>,
     limits: Limits,
+    /// Steps from one sample of the driver to the next.
+    sample_steps: u32,
     last_nm: f64,
     driver_nm: [f64; SAMPLES],
 }
 
 impl DriverLimit {
-    /// Around a law, with limits in N.m.
-    pub fn new(law: Box<dyn Law>, limits: Limits) -> Self {
+    /// Around a law, with limits in N.m, for a driver whose torque is sampled so often.
+    pub fn new(law: Box<dyn Law>, limits: Limits, samples_per_s: f64) -> Self {
         Self {
             law,
             limits,
+            // One step at least.
+            sample_steps: step_of(1.0 / samples_per_s).max(1),
             last_nm: 0.0,
             driver_nm: [0.0; SAMPLES],
         }
@@ -71,9 +77,11 @@ impl DriverLimit {
 impl Law for DriverLimit {
     fn ask(&mut self, view: &LawView) -> f64 {
         let asked_nm = self.law.ask(view);
-        if view.step.is_multiple_of(PERIOD_STEPS) {
+        if view.step.is_multiple_of(self.sample_steps) {
             self.driver_nm.rotate_right(1);
             self.driver_nm[0] = view.driver_torque_nm;
+        }
+        if view.step.is_multiple_of(COMMAND_STEPS) {
             let least = self.driver_nm.into_iter().fold(f64::INFINITY, f64::min);
             let largest = self.driver_nm.into_iter().fold(f64::NEG_INFINITY, f64::max);
             let [low, high] = self.limits.allowed(self.last_nm, [least, largest]);
@@ -88,12 +96,14 @@ impl Law for DriverLimit {
 pub(super) const KIND: Kind<dyn Law> = Kind {
     name: "driver_limit",
     source: "opendbc, driver_limit_check",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("max_nm", 3.0, [0.0, 10.0]),
         Parameter::published("up_nm", 0.04, [0.0, 10.0]),
         Parameter::published("down_nm", 0.1, [0.0, 10.0]),
         Parameter::published("allowance_nm", 0.8, [0.0, 10.0]),
         Parameter::published("factor", 3.0, [0.0, 100.0]),
+        Parameter::published("samples_per_s", 100.0, [1.0, 1000.0]),
     ],
     make: Make::Around(|_, v, law| {
         let limits = Limits {
@@ -103,6 +113,6 @@ pub(super) const KIND: Kind<dyn Law> = Kind {
             allowance: v[3],
             factor: v[4],
         };
-        Box::new(DriverLimit::new(law, limits))
+        Box::new(DriverLimit::new(law, limits, v[5]))
     }),
 };

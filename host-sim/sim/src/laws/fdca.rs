@@ -12,7 +12,7 @@
 //! the time after which it leaves the lane at its rate.
 
 use super::{Kind, Law, LawView, Make, boxed};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 use crate::models::road::DEFAULT_LANE_WIDTH_M;
 use crate::scenario::Scenario;
 
@@ -94,6 +94,7 @@ impl Law for ByTime {
 pub(super) const KIND: Kind<dyn Law> = Kind {
     name: "fdca",
     source: "van Paassen et al. 2017; tud-hri/joan",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("k_y_rad_per_m", 0.15, [0.0, 10.0]).tuned(0.05, 0.5),
         Parameter::published("k_psi", 2.5, [0.0, 50.0]),
@@ -107,6 +108,7 @@ pub(super) const KIND: Kind<dyn Law> = Kind {
 pub(super) const BY_TIME: Kind<dyn Law> = Kind {
     name: "authority_by_tlc",
     source: "Zwaan et al. 2019 (abstract)",
+    origin: Origin::After,
     parameters: &[
         Parameter::published("k_y_rad_per_m", 0.15, [0.0, 10.0]).tuned(0.05, 0.5),
         Parameter::published("k_psi", 2.5, [0.0, 50.0]),

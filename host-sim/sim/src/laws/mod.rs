@@ -13,7 +13,7 @@ mod paper;
 #[cfg(test)]
 mod tests;
 
-use crate::kind::{Kind, Make};
+use crate::kind::{Kind, Make, Origin};
 use crate::scenario::ScenarioError;
 
 pub use driver_limit::{DriverLimit, Limits};
@@ -103,6 +103,7 @@ pub const LAWS: [Kind<dyn Law>; 11] = [
     Kind {
         name: "none",
         source: "no guidance",
+        origin: Origin::Ours,
         parameters: &[],
         make: Make::Part(|_, _| boxed(Nothing)),
     },

@@ -2,7 +2,7 @@
 //! Nacpil and Nakano 2022, table 8.
 
 use super::{Kind, Law, LawView, Make, boxed};
-use crate::kind::Parameter;
+use crate::kind::{Origin, Parameter};
 
 /// The gains of (9).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +43,7 @@ impl Law for Gains {
 pub(super) const KIND: Kind<dyn Law> = Kind {
     name: "paper",
     source: "Wang et al. 2022, (9), table 8",
+    origin: Origin::Published,
     parameters: &[
         Parameter::published("k_1", 0.25, [0.0, 4.0]).tuned(0.25, 0.45),
         Parameter::published("a_1", 2.0, [0.0, 100.0]).tuned(2.0, 6.0),

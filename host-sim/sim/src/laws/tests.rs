@@ -177,9 +177,16 @@ fn a_gain_over_k_hg_compensates_or_follows_a_line_within_its_bounds() {
 }
 
 /// By hand, with the defaults: 0.04 N.m more each 20 ms from the first step on, until 0.5 N.m; with 1.5 N.m against it the bound is
-/// 3 - (1.5 - 0.8)*3 = 0.9, with 1.8 it is 0, to which it falls by 0.1 N.m each 20 ms once all six samples say so.
+/// 3 - (1.5 - 0.8)*3 = 0.9, with 1.8 it is 0, to which it falls by 0.1 N.m each 20 ms once all six samples say so: the sixth comes after 50
+/// ms, with 50 samples a second after 100 ms.
 #[test]
 fn a_limited_law_grows_and_falls_as_the_rule_has_it() {
+    for (samples_per_s, falls) in [(100.0, 2060), (50.0, 2100)] {
+        check_limited(samples_per_s, falls);
+    }
+}
+
+fn check_limited(samples_per_s: f64, falls: u32) {
     let mut law = DriverLimit::new(
         Box::new(Gains {
             k_1: 0.25,
@@ -192,6 +199,7 @@ fn a_limited_law_grows_and_falls_as_the_rule_has_it() {
             allowance: 0.8,
             factor: 3.0,
         },
+        samples_per_s,
     );
     let mut at = |from: u32, to: u32, driver_torque_nm| {
         let asks = (from..to).map(|step| {
@@ -209,9 +217,9 @@ fn a_limited_law_grows_and_falls_as_the_rule_has_it() {
         (20, 40, 0.0, 0.08),
         (40, 1000, 0.0, 0.5),
         (1000, 2000, -1.5, 0.5),
-        (2000, 2100, -1.8, 0.5),
-        (2100, 2120, -1.8, 0.4),
-        (2120, 2200, -1.8, 0.0),
+        (2000, falls, -1.8, 0.5),
+        (falls, falls + 20, -1.8, 0.4),
+        (falls + 20, falls + 100, -1.8, 0.0),
     ] {
         assert!((at(from, to, driver) - expected).abs() < 1e-9, "{to}");
     }
