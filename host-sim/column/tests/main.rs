@@ -1,6 +1,7 @@
 //! Tests of the column with a torsion bar, one file per theme.
 
 mod curve;
+mod drive;
 mod peers;
 mod physics;
 mod studies;

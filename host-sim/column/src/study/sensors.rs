@@ -1,21 +1,19 @@
 //! What a sensor has to deliver: how late and how wrong the observer of `haptic-observer` tells the torque of the hands, by the steps and
 //! the rate of the angle's sensor, the observer's bandwidth, and what is believed of J_w and K_tb.
 //!
-//! The car is that of the column with the medium assist at 60 km/h; its angle is the column's. In the first half the hands steer with
+//! The car has the file's assist, or the medium one, and goes at 60 km/h; its angle is the column's. In the first half the hands steer with
 //! [`HANDS_NM`] at 0.4 Hz and half of it at 1.1 Hz while the guidance moves the column; in the second nobody holds the wheel.
 
 use std::f64::consts::TAU;
 
 use haptic_core::quantity::{Radians, Torque};
 use haptic_observer::{Observer, Parameters, Reading, Setup, SetupError, State};
-use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::sensors::camera_looks;
-use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::parts::{Acting, Vehicle};
+use haptic_sim::scenario::ScenarioError;
 use serde::Serialize;
 
 use super::{ColumnFile, rms};
-use crate::{Assist, ColumnError, Plant};
 
 /// Steps of the angle's sensor, degrees.
 pub const STEPS_DEG: [f64; 3] = [0.005, 0.02, 0.1];
@@ -77,6 +75,8 @@ pub struct Row {
 /// What came of all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
+    /// The assist.
+    pub curve: &'static str,
     /// What the bar's sensor itself is off by, N.m: its own reading taken for the hands', without any lag.
     pub bar_alone_nm: f64,
     /// What the bar's sensor says where nobody holds the wheel, N.m.
@@ -107,7 +107,7 @@ impl Results {
 pub enum SensorsError {
     /// A column that cannot be.
     #[error(transparent)]
-    Column(#[from] ColumnError),
+    Scenario(#[from] ScenarioError),
     /// A column that the observer cannot be set up for.
     #[error("the observer: {0}")]
     Setup(SetupError),
@@ -120,14 +120,8 @@ struct Seen {
     column_rad: f64,
 }
 
-fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ColumnError> {
-    let curves = file.curves();
-    let curve = curves
-        .iter()
-        .find(|(name, _)| *name == "medium")
-        .unwrap_or(&curves[0]);
-    let (vehicle, world) = (VehicleParameters::default(), WorldParameters::default());
-    let mut plant = Plant::new(file.column, Assist::Points(curve.1.clone()), &vehicle, &world, 45)?;
+fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ScenarioError> {
+    let mut plant = file.plant()?.with_assist(file.one_curve().1.assist());
     let mut seen = Vec::with_capacity(HALF);
     for k in 0..HALF {
         let t = 1e-3 * k as f64;
@@ -226,6 +220,7 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
     }
     let bar = |seen: &[Seen]| rms(seen.iter().skip(SETTLES).map(|now| now.bar_nm - now.hands_nm));
     Ok(Results {
+        curve: file.one_curve().0,
         bar_alone_nm: bar(&held),
         bar_no_hand_nm: bar(&free),
         rows,

@@ -2,15 +2,15 @@
 
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
-use haptic_column::Inject;
 use haptic_column::study::assist::{
     Column, DRIVEN_KMH, Felt, Group, GroupRow, LoopRow, Results, Spread, WORKING_NM,
 };
 use haptic_column::study::sensors;
+use haptic_sim::models::torsion_bar::Inject;
 
 /// What stands beside every result: what is not part of it.
 const LEFT_OUT: &str = "The ECU is not part of this: law (9) guides in float64. Drivers keep the gains that the paper found on a column \
-     without assist. `run` and the ECU still have the rigid column.";
+     without assist.";
 
 /// The document of overlay or offset.
 pub fn assist_report(results: &Results) -> Report {
@@ -30,7 +30,7 @@ pub fn assist_report(results: &Results) -> Report {
             vec![Block::Table(drivers_table(&results.drivers))],
         ),
     ];
-    let bar = &results.column;
+    let bar = &results.column.0;
     let summary = format!(
         "A wheel of {} kg.m2 on a bar of {} N.m/rad. Overlay: guidance is added behind the assist; offset: in front of it.",
         bar.j_w_kg_m2, bar.k_tb_nm_per_rad
@@ -190,8 +190,9 @@ pub fn sensors_report(results: &sensors::Results) -> Report {
     ];
     let summary = format!(
         "Hands that steer with {} N.m at 0.4 Hz and half of it at 1.1 Hz, guidance and probe beside them; then no hand. 60 km/h, \
-         medium assist, angle of the column.",
-        sensors::HANDS_NM
+         {} assist, angle of the column.",
+        sensors::HANDS_NM,
+        results.curve
     );
     let note = "The ECU does not use the observer yet. One pattern of hands, a smooth road, no bumps; the angle has no noise but its steps.";
     Report {

@@ -31,6 +31,7 @@ use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
 use crate::models::tolerances::{Car, Tolerances};
+use crate::models::torsion_bar::{AssistParameters, ColumnParameters};
 use crate::models::vehicle::VehicleParameters;
 use crate::seeds::Stream;
 
@@ -231,6 +232,16 @@ impl Scenario {
     /// How far cars of this kind differ.
     pub fn tolerances(&self) -> &Tolerances {
         &self.values.tolerances
+    }
+
+    /// What the steering column is.
+    pub fn column(&self) -> &ColumnParameters {
+        &self.values.column
+    }
+
+    /// What amplifies the torque of its bar.
+    pub fn assist(&self) -> &AssistParameters {
+        &self.values.assist
     }
 
     /// The car that drives: what vehicle, world and sensor errors say, with what the tolerances draw.

@@ -1,117 +1,136 @@
 //! Wheel, bar, column, assist and vehicle, moved by the millisecond.
 //!
 //! Without assist and without friction, on linear tyres and at a speed that holds, a step is the matrix exponential of the
-//! [linear form](crate::linear). Otherwise it is [`INNER_STEPS`] steps of the classical Runge-Kutta method: 0.2 ms, a
+//! [linear form](super::matrices). Otherwise it is [`INNER_STEPS`] steps of the classical Runge-Kutta method: 0.2 ms, a
 //! twentieth of the period of 250 Hz, beside 9 Hz of the wheel on its bar and some 50 Hz of the assist's loop at a standstill.
 //! Torques of hands and guidance hold during a step, as does the noise of the sensor.
 
-use haptic_sim::models::STEP_S;
-use haptic_sim::models::nonlinear::{SingleTrack, SteeringColumn, Surroundings, WorldParameters};
-use haptic_sim::models::plant::{Plant as Place, PlantState};
-use haptic_sim::models::vehicle::VehicleParameters;
-use haptic_sim::parts::{Acting, Motion, Vehicle};
 use nalgebra::SMatrix;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::assist::Assist;
-use crate::parameters::{BarParameters, ColumnError, Inject};
+use super::assist::Assist;
+use super::exact::transition;
+use super::parameters::{AngleSensor, AssistParameters, ColumnParameters, Inject};
+use crate::models::STEP_S;
+use crate::models::nonlinear::{RIPPLES, SingleTrack, SteeringColumn, Surroundings, Wind, WorldParameters};
+use crate::models::plant::{Plant as Place, PlantState};
+use crate::parts::{Acting, BarState, Motion, Vehicle};
+use crate::scenario::Scenario;
+use crate::seeds::Stream;
 
 /// Number of states.
 pub const STATES: usize = 13;
 /// Inputs: T_hand, T_h, what the sensor adds.
-pub(crate) const INPUTS: usize = 3;
+pub const INPUTS: usize = 3;
 /// Runge-Kutta steps in a millisecond.
 const INNER_STEPS: u32 = 5;
 
-/// Lateral speed of the centre of gravity, m/s, and yaw rate.
-pub(crate) const LATERAL: usize = 0;
-pub(crate) const YAW_RATE: usize = 1;
-/// phi_w, phi_w', and how far the wheel's friction has given.
-pub(crate) const WHEEL: usize = 2;
-pub(crate) const WHEEL_RATE: usize = 3;
-pub(crate) const WHEEL_GIVE: usize = 4;
-/// phi_c, phi_c', and how far the column's friction has given.
-pub(crate) const COLUMN: usize = 5;
-pub(crate) const COLUMN_RATE: usize = 6;
-pub(crate) const COLUMN_GIVE: usize = 7;
-/// The sensor behind its lag, and the lag of the compensator, N.m.
-pub(crate) const SENSOR: usize = 8;
-pub(crate) const LAG: usize = 9;
-/// The motor's torque, and the part of it that is guidance, N.m.
-pub(crate) const MOTOR: usize = 10;
-pub(crate) const GUIDANCE: usize = 11;
+/// Lateral speed of the centre of gravity, m/s.
+pub const LATERAL: usize = 0;
+/// r.
+pub const YAW_RATE: usize = 1;
+/// phi_w.
+pub const WHEEL: usize = 2;
+/// phi_w'.
+pub const WHEEL_RATE: usize = 3;
+/// How far the wheel's friction has given, rad.
+pub const WHEEL_GIVE: usize = 4;
+/// phi_c.
+pub const COLUMN: usize = 5;
+/// phi_c'.
+pub const COLUMN_RATE: usize = 6;
+/// How far the column's friction has given, rad.
+pub const COLUMN_GIVE: usize = 7;
+/// The sensor behind its lag, N.m.
+pub const SENSOR: usize = 8;
+/// The lag of the compensator, N.m.
+pub const LAG: usize = 9;
+/// The motor's torque, N.m.
+pub const MOTOR: usize = 10;
+/// The part of it that is guidance, N.m.
+pub const GUIDANCE: usize = 11;
 /// psi.
-pub(crate) const YAW: usize = 12;
+pub const YAW: usize = 12;
 
-pub(crate) type State = [f64; STATES];
+/// A value for each state.
+pub type State = [f64; STATES];
 
 /// What holds during a step, but for the speed, which changes linearly.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Held {
-    pub(crate) hands_nm: f64,
-    pub(crate) guidance_nm: f64,
-    pub(crate) sensor_adds_nm: f64,
-    pub(crate) v_m_per_s: f64,
-    pub(crate) bank_rad: f64,
+pub(super) struct Held {
+    pub(super) hands_nm: f64,
+    pub(super) guidance_nm: f64,
+    pub(super) sensor_adds_nm: f64,
+    pub(super) v_m_per_s: f64,
+    pub(super) bank_rad: f64,
+    /// Side force and yaw moment of the wind, N and N.m.
+    pub(super) wind: [f64; 2],
 }
 
 /// A car with a torsion bar, at some place.
 #[derive(Debug, Clone)]
-pub struct Plant {
+pub struct BarPlant {
     /// Its column.
-    pub bar: BarParameters,
-    /// Its assist.
+    pub column: ColumnParameters,
+    /// Its compensator and motor, and where guidance is brought in.
+    pub motor: AssistParameters,
+    /// What amplifies.
     pub assist: Assist,
+    /// Torque on the column beside that of the tyres, from the next step on, N.m: what a bump kicks back.
+    pub kick_nm: f64,
     vehicle: SingleTrack,
-    mu: f64,
+    world: WorldParameters,
+    wind: Wind,
     upper: SteeringColumn,
     lower: SteeringColumn,
     place: Place,
     state: State,
+    v_m_per_s: f64,
     /// The exact step, where there is one, and the speed that it is for.
     exact: Option<(f64, Box<SMatrix<f64, STATES, { STATES + INPUTS }>>)>,
     noise: Xoshiro256PlusPlus,
     sensor_adds_nm: f64,
 }
 
-impl Plant {
-    /// A car at the origin. Of the world tyres, grip and castor count; friction and motor are the column's.
-    ///
-    /// # Errors
-    /// A column or a curve that cannot be.
-    pub fn new(
-        bar: BarParameters,
-        assist: Assist,
-        vehicle: &VehicleParameters,
-        world: &WorldParameters,
-        seed: u64,
-    ) -> Result<Self, ColumnError> {
-        bar.check(vehicle)?;
-        if let Assist::Points(curve) = &assist {
-            curve.check()?;
-        }
+impl BarPlant {
+    /// A scenario's car at the start of the course: the one that its tolerances draw.
+    pub fn new(scenario: &Scenario) -> Self {
+        let (car, values) = (scenario.car(), scenario.values());
+        let (column, motor) = (values.column, values.assist.clone());
         let body = |inertia, damping, friction_nm| SteeringColumn {
             inertia,
             damping,
             friction_nm,
-            give_rad: bar.friction_give_rad,
+            give_rad: column.friction_give_rad,
         };
-        let (j_w, b_w) = (bar.j_w_kg_m2, bar.b_w_nms_per_rad);
-        Ok(Self {
+        let (vehicle, world) = (&car.vehicle, car.world);
+        let (j_w, b_w) = (column.j_w_kg_m2, column.b_w_nms_per_rad);
+        let noise = Stream::Bar.seed(scenario.seed());
+        Self {
             vehicle: SingleTrack::new(vehicle, world.tyres, world.castor_share),
-            mu: world.mu,
-            upper: body(j_w, b_w, bar.upper_friction_nm),
-            lower: body(vehicle.j_s - j_w, vehicle.b_s - b_w, bar.lower_friction_nm),
+            wind: Wind::new(&world, Stream::World.seed(scenario.seed())),
+            upper: body(j_w, b_w, column.upper_friction_nm),
+            lower: body(vehicle.j_s - j_w, vehicle.b_s - b_w, column.lower_friction_nm),
+            world,
             place: Place::default(),
             state: [0.0; STATES],
+            v_m_per_s: scenario.speed_m_per_s(),
             exact: None,
-            noise: Xoshiro256PlusPlus::seed_from_u64(seed),
-            sensor_adds_nm: bar.sensor_offset_nm,
-            bar,
-            assist,
-        })
+            noise: Xoshiro256PlusPlus::seed_from_u64(noise),
+            sensor_adds_nm: column.sensor_offset_nm,
+            kick_nm: 0.0,
+            assist: motor.curve.assist(),
+            column,
+            motor,
+        }
+    }
+
+    /// The car with another assist.
+    #[must_use]
+    pub fn with_assist(self, assist: Assist) -> Self {
+        Self { assist, ..self }
     }
 
     /// The states: v_y, r; phi_w, phi_w', give; phi_c, phi_c', give; sensor, compensator; motor, its guidance; psi.
@@ -130,61 +149,69 @@ impl Plant {
     }
 
     fn bar_of(&self, x: &State) -> f64 {
-        self.bar.k_tb_nm_per_rad * (x[WHEEL] - x[COLUMN])
-            + self.bar.b_tb_nms_per_rad * (x[WHEEL_RATE] - x[COLUMN_RATE])
+        self.column.k_tb_nm_per_rad * (x[WHEEL] - x[COLUMN])
+            + self.column.b_tb_nms_per_rad * (x[WHEEL_RATE] - x[COLUMN_RATE])
     }
 
     /// What the bar's sensor says, N.m: its range, and steps of its resolution.
     pub fn sensor_torque_nm(&self) -> f64 {
-        let steps = self.sensed(self.state[SENSOR], self.sensor_adds_nm) / self.bar.sensor_resolution_nm;
-        steps.round() * self.bar.sensor_resolution_nm
+        let steps = self.sensed(self.state[SENSOR], self.sensor_adds_nm) / self.column.sensor_resolution_nm;
+        steps.round() * self.column.sensor_resolution_nm
     }
 
     /// A converter reads no more than its range.
     fn sensed(&self, torque_nm: f64, adds_nm: f64) -> f64 {
-        let most = self.bar.sensor_range_nm;
+        let most = self.column.sensor_range_nm;
         (torque_nm + adds_nm).clamp(-most, most)
     }
 
     /// Behind the compensator, N.m.
-    pub(crate) fn compensated(&self, x: &State, adds_nm: f64) -> f64 {
-        let lead = self.bar.lead_s / self.bar.lag_s;
+    pub fn compensated(&self, x: &State, adds_nm: f64) -> f64 {
+        let lead = self.motor.lead_s / self.motor.lag_s;
         lead * self.sensed(x[SENSOR], adds_nm) + (1.0 - lead) * x[LAG]
     }
 
     /// What the motor is asked for, all and without guidance, N.m: no more than it has.
     fn demand(&self, x: &State, held: &Held) -> [f64; 2] {
-        let most = self.bar.motor_limit_nm;
+        let most = self.motor.limit_nm;
         let torque = self.compensated(x, held.sensor_adds_nm);
         let alone = self.assist.at(torque, held.v_m_per_s);
-        let all = match self.bar.inject {
+        let all = match self.motor.inject {
             Inject::Overlay => alone + held.guidance_nm,
             Inject::Offset => self.assist.at(torque + held.guidance_nm, held.v_m_per_s),
         };
         [all, alone].map(|nm| nm.clamp(-most, most))
     }
 
-    /// T_h as hands that hold the wheel feel it at the bar's torque of now, N.m: of what the motor turns the column with, a column
-    /// with an assist of slope g hands on 1/(1 + g).
-    pub fn felt_nm(&self, v_m_per_s: f64) -> f64 {
-        let torque = self.sensed(self.state[SENSOR], self.sensor_adds_nm);
-        self.state[GUIDANCE] / (1.0 + self.assist.slope(torque, v_m_per_s))
-    }
-
     /// The part of the motor's torque that is guidance, N.m.
     pub fn guidance_torque_nm(&self) -> f64 {
-        self.state[GUIDANCE]
+        self.state[GUIDANCE] * (1.0 + self.world.motor_error)
+    }
+
+    /// T_h as hands that hold the wheel feel it at the bar's torque of now, N.m: of what the motor turns the column with, a column
+    /// with an assist of slope g hands on 1/(1 + g).
+    pub fn felt_nm(&self) -> f64 {
+        let torque = self.sensed(self.state[SENSOR], self.sensor_adds_nm);
+        self.guidance_torque_nm() / (1.0 + self.assist.slope(torque, self.v_m_per_s))
+    }
+
+    /// Where it is, with an arm's torque beside it.
+    pub(crate) fn place(&self, arm_nm: f64) -> Place {
+        let mut place = self.place.clone();
+        place.set_arm_nm(arm_nm);
+        place
     }
 
     /// The derivatives of the states.
-    pub(crate) fn rates(&self, x: &State, held: &Held) -> State {
-        let bar = &self.bar;
+    pub(super) fn rates(&self, x: &State, held: &Held) -> State {
+        let (column, motor) = (&self.column, &self.motor);
         let torque_nm = self.bar_of(x);
+        let [force_n, moment_nm] = held.wind;
         let around = Surroundings {
-            mu: self.mu,
+            mu: self.world.mu,
             bank_rad: held.bank_rad,
-            force_n: 0.0,
-            moment_nm: 0.0,
+            force_n,
+            moment_nm,
         };
         let response = self
             .vehicle
@@ -192,10 +219,12 @@ impl Plant {
         let upper = self
             .upper
             .respond(x[WHEEL_RATE], x[WHEEL_GIVE], held.hands_nm - torque_nm);
-        let on_column = torque_nm + x[MOTOR] + response.aligning_nm;
+        let ripple = self.world.motor_ripple_nm * (RIPPLES * x[COLUMN]).sin();
+        let acting = x[MOTOR] * (1.0 + self.world.motor_error) + ripple;
+        let on_column = torque_nm + acting + response.aligning_nm + self.kick_nm;
         let lower = self.lower.respond(x[COLUMN_RATE], x[COLUMN_GIVE], on_column);
         let [all, alone] = self.demand(x, held);
-        let twist_nm = bar.k_tb_nm_per_rad * (x[WHEEL] - x[COLUMN]);
+        let twist_nm = column.k_tb_nm_per_rad * (x[WHEEL] - x[COLUMN]);
         [
             response.rates[0],
             response.rates[1],
@@ -205,10 +234,10 @@ impl Plant {
             x[COLUMN_RATE],
             lower[0],
             lower[1],
-            (twist_nm - x[SENSOR]) / bar.sensor_lag_s,
-            (self.sensed(x[SENSOR], held.sensor_adds_nm) - x[LAG]) / bar.lag_s,
-            (all - x[MOTOR]) / bar.motor_lag_s,
-            (all - alone - x[GUIDANCE]) / bar.motor_lag_s,
+            (twist_nm - x[SENSOR]) / column.sensor_lag_s,
+            (self.sensed(x[SENSOR], held.sensor_adds_nm) - x[LAG]) / motor.lag_s,
+            (all - x[MOTOR]) / motor.motor_lag_s,
+            (all - alone - x[GUIDANCE]) / motor.motor_lag_s,
             x[YAW_RATE],
         ]
     }
@@ -218,7 +247,8 @@ impl Plant {
         self.assist == Assist::None
             && self.upper.friction_nm == 0.0
             && self.lower.friction_nm == 0.0
-            && self.vehicle.tyres == haptic_sim::models::nonlinear::Tyres::Linear
+            && self.world.is_ideal()
+            && self.kick_nm == 0.0
             && acting.speed_m_per_s[0] == acting.speed_m_per_s[1]
             && acting.bank_rad == 0.0
     }
@@ -226,10 +256,10 @@ impl Plant {
     fn step_exactly(&mut self, held: &Held) {
         let v = held.v_m_per_s;
         if self.exact.as_ref().is_none_or(|(of, _)| *of != v) {
-            self.exact = Some((v, Box::new(crate::linear::transition(self, v))));
+            self.exact = Some((v, Box::new(transition(self, v))));
         }
         let Some((_, step)) = &self.exact else { return };
-        let most = self.bar.motor_limit_nm;
+        let most = self.motor.limit_nm;
         let inputs = [
             held.hands_nm,
             held.guidance_nm.clamp(-most, most),
@@ -258,7 +288,7 @@ impl Plant {
     }
 }
 
-impl Vehicle for Plant {
+impl Vehicle for BarPlant {
     fn step(&mut self, acting: &Acting) -> f64 {
         let [from, to] = acting.speed_m_per_s;
         let held = Held {
@@ -266,7 +296,8 @@ impl Vehicle for Plant {
             guidance_nm: acting.guidance_torque_nm,
             sensor_adds_nm: self.sensor_adds_nm,
             v_m_per_s: from,
-            bank_rad: acting.bank_rad,
+            bank_rad: acting.bank_rad + self.world.bank_rad,
+            wind: self.wind.step(),
         };
         if self.is_linear(acting) {
             self.step_exactly(&held);
@@ -284,11 +315,16 @@ impl Vehicle for Plant {
         };
         self.place
             .set_state(state, x[LATERAL].hypot(0.5 * (from + to)) * STEP_S);
-        if self.bar.sensor_noise_nm > 0.0 {
+        self.v_m_per_s = to;
+        if self.column.sensor_noise_nm > 0.0 {
             let white: f64 = StandardNormal.sample(&mut self.noise);
-            self.sensor_adds_nm = self.bar.sensor_offset_nm + self.bar.sensor_noise_nm * white;
+            self.sensor_adds_nm = self.column.sensor_offset_nm + self.column.sensor_noise_nm * white;
         }
-        self.state[GUIDANCE]
+        match self.motor.inject {
+            Inject::Overlay => self.guidance_torque_nm(),
+            // What the curve makes of an offset nobody measures apart: an actuator tells the offset that it took.
+            Inject::Offset => acting.guidance_torque_nm,
+        }
     }
 
     /// Its wheel is the one that the hands hold.
@@ -306,15 +342,29 @@ impl Vehicle for Plant {
     fn ahead_m(&self, distance_m: f64) -> [f64; 2] {
         self.place.ahead_m(distance_m)
     }
+
+    fn bar(&self) -> Option<BarState> {
+        let x = &self.state;
+        Some(BarState {
+            sensor_nm: self.sensor_torque_nm(),
+            torque_nm: self.bar_torque_nm(),
+            assist_nm: (x[MOTOR] - x[GUIDANCE]) * (1.0 + self.world.motor_error),
+            felt_nm: self.felt_nm(),
+            told_angle_rad: match self.column.angle {
+                AngleSensor::Wheel => x[WHEEL],
+                AngleSensor::Column => x[COLUMN],
+            },
+        })
+    }
 }
 
-impl Plant {
-    /// A copy at rest without friction, noise and offset, with another assist.
-    pub(crate) fn frictionless(&self, assist: Assist) -> Self {
-        let mut other = self.clone();
-        other.bar = self.bar.linear();
+impl BarPlant {
+    /// A copy at rest without friction, noise and offset, with another assist: one whose linear form is exact.
+    #[must_use]
+    pub fn frictionless(&self, assist: Assist) -> Self {
+        let mut other = self.clone().with_assist(assist);
+        other.column = self.column.linear();
         (other.upper.friction_nm, other.lower.friction_nm) = (0.0, 0.0);
-        other.assist = assist;
         other
     }
 }
