@@ -2,9 +2,11 @@
 //! threads and progress are whose program it is.
 //!
 //! - [`assist`]: overlay or offset, what hands feel of it, margins, what a sudden loss costs.
+//! - [`hands`]: whether a hand is at the wheel, and how soon that is known.
 //! - [`sensors`]: the hands' torque by the observer of `haptic-observer`, by the angle's sensor.
 
 pub mod assist;
+pub mod hands;
 pub mod sensors;
 
 use haptic_sim::Scenario;

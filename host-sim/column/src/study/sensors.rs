@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use haptic_core::quantity::{Radians, Torque};
 use haptic_observer::{Observer, Parameters, Reading, Setup, SetupError, State};
 use haptic_sim::models::sensors::camera_looks;
+use haptic_sim::models::torsion_bar::ColumnParameters;
 use haptic_sim::parts::{Acting, Vehicle};
 use haptic_sim::scenario::ScenarioError;
 use serde::Serialize;
@@ -48,6 +49,11 @@ impl Rate {
             Self::EveryStep => 1000.0,
             Self::Camera => 120.0,
         }
+    }
+
+    /// Whether an angle is sampled in a step.
+    pub(super) fn samples(self, step: u32) -> bool {
+        self == Self::EveryStep || camera_looks(step)
     }
 }
 
@@ -147,6 +153,20 @@ fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ScenarioError> 
     Ok(seen)
 }
 
+/// An observer's parameters, all known, for an angle of the column.
+pub(super) fn believed(column: &ColumnParameters, rate: Rate, bandwidth: f64) -> Parameters {
+    Parameters {
+        j_w: column.j_w_kg_m2,
+        b_w: column.b_w_nms_per_rad,
+        friction_nm: column.upper_friction_nm,
+        friction_give_rad: column.friction_give_rad,
+        k_tb: column.k_tb_nm_per_rad,
+        sample_ms: 1000.0 / rate.hz(),
+        bandwidth,
+        ..Parameters::default()
+    }
+}
+
 /// What an observer says of a record, less the hands' torque of its lag ago: root of the mean square, N.m.
 fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
     let observer = Observer::new(Setup::new(of).map_err(SensorsError::Setup)?);
@@ -154,7 +174,7 @@ fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Resul
     let lag = f64::from(observer.setup().lag_us()) * 1e-3;
     let (whole, rest) = (lag.floor() as usize, lag.fract());
     let errors = seen.iter().enumerate().map(|(k, now)| {
-        let is_sampled = rate == Rate::EveryStep || camera_looks(k as u32);
+        let is_sampled = rate.samples(k as u32);
         let angle = is_sampled.then(|| Radians::from_rad((now.column_rad / step_rad).round() * step_rad));
         let bar_torque = Torque::from_nm(now.bar_nm);
         let found = observer
@@ -179,16 +199,7 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
     for rate in RATES {
         for step_deg in STEPS_DEG {
             for bandwidth in BANDWIDTHS.into_iter().filter(|w| *w <= rate.hz()) {
-                let right = Parameters {
-                    j_w: column.j_w_kg_m2,
-                    b_w: column.b_w_nms_per_rad,
-                    friction_nm: column.upper_friction_nm,
-                    friction_give_rad: column.friction_give_rad,
-                    k_tb: column.k_tb_nm_per_rad,
-                    sample_ms: 1000.0 / rate.hz(),
-                    bandwidth,
-                    ..Parameters::default()
-                };
+                let right = believed(column, rate, bandwidth);
                 let error = |of: Parameters| deviation(&of, &held, step_deg, rate);
                 let wrong = |change: &dyn Fn(f64) -> Parameters, by: f64| {
                     Ok::<_, SensorsError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
