@@ -105,7 +105,7 @@ fn a_bar_that_is_not_asked_for_is_refused() {
             "[column]\nk_tb_nm_per_rad = 100\n",
             "column.k_tb_nm_per_rad = 100",
         ),
-        ("[column]\nangle = \"column\"\n", "column.angle = \"column\""),
+        ("[column]\nangle = \"column\"\n", "column.angle or column.fault"),
         ("[assist]\nlimit_nm = 50\n", "assist.limit_nm = 50"),
         ("[assist]\ncurve = \"light\"\n", "assist.inject or assist.curve"),
     ] {

@@ -2,6 +2,7 @@
 
 mod curve;
 mod drive;
+mod faults;
 mod hands;
 mod peers;
 mod physics;

@@ -159,6 +159,8 @@ class ColumnTable(TypedDict, total=False):
     sensor_offset_nm: float
     sensor_lag_s: float
     angle: Literal["wheel", "column"]
+    fault: Literal["none", "sensor-offset", "sensor-drift", "sensor-stuck", "sensor-doubled", "broken-bar", "assist-lost", "assist-runaway"]
+    fault_time_s: float
 
 class CurveTable(TypedDict):
     torque_nm: list[float]

@@ -121,6 +121,7 @@ impl Scenario {
         let times = [
             ("failure.time_s", self.failure().at_s()),
             ("driver_change.time_s", change_s),
+            ("column.fault_time_s", self.column().fault_at_s()),
         ];
         for (field, time_s) in times {
             if let Some(time_s) = time_s {

@@ -18,5 +18,5 @@ mod plant;
 
 pub use assist::{Assist, Curve, CurveChoice, Usual};
 pub use exact::matrices;
-pub use parameters::{AngleSensor, AssistParameters, ColumnKind, ColumnParameters, Inject};
+pub use parameters::{AngleSensor, AssistParameters, ColumnFault, ColumnKind, ColumnParameters, Inject};
 pub use plant::*;

@@ -21,6 +21,29 @@ pub enum ColumnKind {
     TorsionBar,
 }
 
+/// What fails in a column with a bar, from an instant on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ColumnFault {
+    /// Nothing.
+    #[default]
+    None,
+    /// The sensor reads 1 N.m more.
+    SensorOffset,
+    /// The sensor reads more by 0.05 N.m in a second.
+    SensorDrift,
+    /// The sensor reads what it read last.
+    SensorStuck,
+    /// The sensor reads twice the torque.
+    SensorDoubled,
+    /// The bar has a tenth of its stiffness left, and its sensor reads the twist as that of the whole one.
+    BrokenBar,
+    /// The motor assists no longer; it still guides.
+    AssistLost,
+    /// The assist turns left with all that the motor may.
+    AssistRunaway,
+}
+
 /// Which angle the ECU is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -44,6 +67,7 @@ pub enum Inject {
 }
 
 impl FieldValue for ColumnKind {}
+impl FieldValue for ColumnFault {}
 impl FieldValue for AngleSensor {}
 impl FieldValue for Inject {}
 impl FieldValue for CurveChoice {}
@@ -80,6 +104,12 @@ fields! {
         sensor_lag_s: f64 = 0.001, "sensor_lag_s", "", "s", Between(0.0002, 0.05);
         /// which angle the ECU is told: above or below the bar
         angle: AngleSensor = AngleSensor::Wheel, "angle", "", "", OneOf(&["wheel", "column"]);
+        /// what fails: nothing, the sensor (1 N.m more, 0.05 N.m/s more, its last reading, twice), the bar (a tenth of K_tb), the assist
+        fault: ColumnFault = ColumnFault::None, "fault", "", "", OneOf(&[
+            "none", "sensor-offset", "sensor-drift", "sensor-stuck", "sensor-doubled", "broken-bar", "assist-lost", "assist-runaway",
+        ]);
+        /// when it fails, before the run ends
+        fault_time_s: f64 = 70.0, "fault_time_s", "", "s", Between(0.0, 1e6);
     }
 }
 
@@ -119,6 +149,11 @@ impl ColumnParameters {
             sensor_offset_nm: 0.0,
             ..self
         }
+    }
+
+    /// When something fails, if it does, s.
+    pub fn fault_at_s(&self) -> Option<f64> {
+        (self.fault != ColumnFault::None).then_some(self.fault_time_s)
     }
 
     /// Whether there is a bar.
@@ -161,7 +196,7 @@ impl ColumnParameters {
             let what = match (first_changed(self), first_changed(assist)) {
                 (Some(changed), _) => number("column", changed),
                 (None, Some(changed)) => number("assist", changed),
-                (None, None) if self.angle != AngleSensor::Wheel => "column.angle = \"column\"".into(),
+                (None, None) if *self != Self::default() => "column.angle or column.fault".into(),
                 (None, None) if *assist != AssistParameters::default() => {
                     "assist.inject or assist.curve".into()
                 }

@@ -12,10 +12,10 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::assist::Assist;
 use super::exact::transition;
-use super::parameters::{AngleSensor, AssistParameters, ColumnParameters, Inject};
-use crate::models::STEP_S;
+use super::parameters::{AngleSensor, AssistParameters, ColumnFault, ColumnParameters, Inject};
 use crate::models::nonlinear::{RIPPLES, SingleTrack, SteeringColumn, Surroundings, Wind, WorldParameters};
 use crate::models::plant::{Plant as Place, PlantState};
+use crate::models::{STEP_S, step_of};
 use crate::parts::{Acting, BarState, Motion, Vehicle};
 use crate::scenario::Scenario;
 use crate::seeds::Stream;
@@ -92,6 +92,12 @@ pub struct BarPlant {
     exact: Option<(f64, Box<SMatrix<f64, STATES, { STATES + INPUTS }>>)>,
     noise: Xoshiro256PlusPlus,
     sensor_adds_nm: f64,
+    /// Steps until something fails; none if nothing will.
+    fails_in: Option<u32>,
+    /// What fails now.
+    fault: ColumnFault,
+    /// What a stuck sensor reads, N.m.
+    stuck_nm: f64,
 }
 
 impl BarPlant {
@@ -121,6 +127,9 @@ impl BarPlant {
             noise: Xoshiro256PlusPlus::seed_from_u64(noise),
             sensor_adds_nm: column.sensor_offset_nm,
             kick_nm: 0.0,
+            fails_in: column.fault_at_s().map(step_of),
+            fault: ColumnFault::None,
+            stuck_nm: 0.0,
             assist: motor.curve.assist(),
             column,
             motor,
@@ -149,7 +158,12 @@ impl BarPlant {
     }
 
     fn bar_of(&self, x: &State) -> f64 {
-        self.column.k_tb_nm_per_rad * (x[WHEEL] - x[COLUMN])
+        let left = if self.fault == ColumnFault::BrokenBar {
+            0.1
+        } else {
+            1.0
+        };
+        left * self.column.k_tb_nm_per_rad * (x[WHEEL] - x[COLUMN])
             + self.column.b_tb_nms_per_rad * (x[WHEEL_RATE] - x[COLUMN_RATE])
     }
 
@@ -162,7 +176,32 @@ impl BarPlant {
     /// A converter reads no more than its range.
     fn sensed(&self, torque_nm: f64, adds_nm: f64) -> f64 {
         let most = self.column.sensor_range_nm;
-        (torque_nm + adds_nm).clamp(-most, most)
+        let reads_nm = match self.fault {
+            ColumnFault::SensorStuck => self.stuck_nm,
+            ColumnFault::SensorDoubled => 2.0 * torque_nm + adds_nm,
+            _ => torque_nm + adds_nm,
+        };
+        reads_nm.clamp(-most, most)
+    }
+
+    /// Lets time pass for what fails.
+    fn age(&mut self) {
+        match self.fails_in {
+            None => {}
+            Some(0) => {
+                self.stuck_nm = self.sensed(self.state[SENSOR], self.sensor_adds_nm);
+                (self.fails_in, self.fault) = (None, self.column.fault);
+                if self.fault == ColumnFault::SensorOffset {
+                    self.column.sensor_offset_nm += 1.0;
+                    self.sensor_adds_nm += 1.0;
+                }
+            }
+            Some(left) => self.fails_in = Some(left - 1),
+        }
+        if self.fault == ColumnFault::SensorDrift {
+            self.column.sensor_offset_nm += 0.05 * STEP_S;
+            self.sensor_adds_nm += 0.05 * STEP_S;
+        }
     }
 
     /// Behind the compensator, N.m.
@@ -175,10 +214,15 @@ impl BarPlant {
     fn demand(&self, x: &State, held: &Held) -> [f64; 2] {
         let most = self.motor.limit_nm;
         let torque = self.compensated(x, held.sensor_adds_nm);
-        let alone = self.assist.at(torque, held.v_m_per_s);
+        let curve = |torque_nm| match self.fault {
+            ColumnFault::AssistLost => 0.0,
+            ColumnFault::AssistRunaway => most,
+            _ => self.assist.at(torque_nm, held.v_m_per_s),
+        };
+        let alone = curve(torque);
         let all = match self.motor.inject {
             Inject::Overlay => alone + held.guidance_nm,
-            Inject::Offset => self.assist.at(torque + held.guidance_nm, held.v_m_per_s),
+            Inject::Offset => curve(torque + held.guidance_nm),
         };
         [all, alone].map(|nm| nm.clamp(-most, most))
     }
@@ -245,6 +289,7 @@ impl BarPlant {
     /// Whether the exact step holds: nothing bends, but what the sensor and the motor cut off, which no assist means for the first.
     fn is_linear(&self, acting: &Acting) -> bool {
         self.assist == Assist::None
+            && self.fault == ColumnFault::None
             && self.upper.friction_nm == 0.0
             && self.lower.friction_nm == 0.0
             && self.world.is_ideal()
@@ -290,6 +335,7 @@ impl BarPlant {
 
 impl Vehicle for BarPlant {
     fn step(&mut self, acting: &Acting) -> f64 {
+        self.age();
         let [from, to] = acting.speed_m_per_s;
         let held = Held {
             hands_nm: acting.driver_torque_nm,
