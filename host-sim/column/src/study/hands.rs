@@ -77,7 +77,7 @@ impl Hand {
 pub enum Scene {
     /// Guidance of 0.15 N.m rms and the probe.
     Straight,
-    /// The same, and 1.5 N.m that come and go in 20 s.
+    /// Guidance and probe of a straight, and 1.5 N.m that come and go in 20 s.
     Bends,
     /// Bends on a rough road with a pothole in 5 s, which kick back through the aligning torque.
     Bumps,

@@ -32,7 +32,7 @@ pub enum Usual {
 }
 
 impl Usual {
-    /// Those that assist.
+    /// The curves that assist.
     pub const ALL: [Self; 3] = [Self::Light, Self::Medium, Self::Strong];
 
     /// Its name in a file.
