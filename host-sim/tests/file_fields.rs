@@ -155,6 +155,19 @@ fn scenario_text(row: &DocumentedField, value: &str) -> String {
     }
 }
 
+/// A scenario in which one field has a value, and a bar if the field is of one.
+fn usable_text(row: &DocumentedField, value: &str) -> String {
+    const KIND: &str = "[column]\nkind = \"torsion-bar\"\n";
+    let text = scenario_text(row, value);
+    match (row.table.as_str(), row.field.as_str()) {
+        ("column", "kind") => text,
+        ("column", _) => text.replace("[column]\n", KIND),
+        ("assist", "inject") => format!("{KIND}{text}curve = \"light\"\n"),
+        ("assist", _) => format!("{KIND}{text}"),
+        _ => text,
+    }
+}
+
 fn scenario(text: &str) -> Result<Scenario, String> {
     Scenario::from_toml("s", text, |name, _| Err(InputError::new(name, "not there")))
         .map_err(|e| e.to_string())
@@ -206,14 +219,15 @@ fn exemplified(table: &str, field: &Field) -> String {
 fn typed(_table: &str, field: &Field) -> String {
     let kind = match field.range {
         Range::Between(..) => "float".into(),
-        Range::OneOf(words) => format!(
-            "Literal[{}]",
-            words
-                .iter()
-                .map(|w| format!("{w:?}"))
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
+        Range::OneOf(words) => {
+            let words: Vec<_> = words.iter().map(|word| format!("{word:?}")).collect();
+            let words = format!("Literal[{}]", words.join(", "));
+            match field.name {
+                // By points too.
+                "curve" => format!("Union[{words}, CurveTable]"),
+                _ => words,
+            }
+        }
         Range::Whole => "int".into(),
         Range::Flag => "bool".into(),
     };
@@ -305,7 +319,7 @@ fn the_other_fields_of_a_scenario_are_in_the_table() {
 fn every_range_of_a_scenario_is_the_codes() {
     let mut numbers = 0;
     for row in fields_of_a_scenario() {
-        let refusal = |value: &str| scenario(&scenario_text(&row, value)).err();
+        let refusal = |value: &str| scenario(&usable_text(&row, value)).err();
         if let Some([from, to]) = row.ends() {
             numbers += 1;
             let unit = if row.unit.is_empty() {

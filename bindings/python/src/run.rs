@@ -3,7 +3,6 @@
 use haptic_batch::engine::Watch;
 use haptic_batch::readings::Readings;
 use haptic_core::bus::Frame;
-use haptic_log::trace::CHANNELS;
 use haptic_metrics::{DEFINITIONS, Window};
 use haptic_sim::simulation::Run;
 use numpy::{PyArray1, PyArray2};
@@ -19,7 +18,7 @@ use crate::scenario::Scenario;
 /// The columns as arrays, which own what they show.
 fn columns<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let made = PyDict::new(py);
-    for channel in &CHANNELS {
+    for channel in run.trace.channels() {
         let column = run.trace.samples.iter().map(channel.value).collect();
         made.set_item(channel.name, PyArray1::from_vec(py, column))?;
     }

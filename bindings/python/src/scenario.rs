@@ -34,7 +34,7 @@ use crate::errors;
 ///     What the controller sees.
 /// seed : int, optional
 ///     Root of all random numbers.
-/// driver, vehicle, guidance, failure, driver_change, world, sensor_errors : mapping, optional
+/// driver, vehicle, guidance, failure, driver_change, world, sensor_errors, tolerances, column, assist : mapping, optional
 ///     The tables of the file, such as ``driver={"t_p_s": 0.3}``.
 ///
 /// Raises

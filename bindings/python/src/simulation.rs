@@ -181,7 +181,10 @@ fn outcome(py: Python<'_>, from: &haptic_sim::Outcome<'_>) -> PyResult<Outcome> 
     let sample = from.sample.as_ref().map(|sample| {
         let values = PyDict::new(py);
         for channel in &CHANNELS {
-            values.set_item(channel.name, (channel.value)(sample))?;
+            let value = (channel.value)(sample);
+            if !channel.is_optional || !value.is_nan() {
+                values.set_item(channel.name, value)?;
+            }
         }
         Ok::<_, PyErr>(values.unbind())
     });

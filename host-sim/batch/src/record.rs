@@ -122,6 +122,16 @@ pub fn peak_m(run: &Run, [from_s, to_s]: [f64; 2]) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// Whether a scenario's column is the rigid one, which the growth of a motion is known for.
+pub(crate) fn check_rigid(scenario: &Scenario) -> Result<(), StudyError> {
+    match scenario.column().has_bar() {
+        true => refuse(
+            "column.kind = \"torsion-bar\": whether its loop is stable is not judged here; leave [column] out",
+        ),
+        false => Ok(()),
+    }
+}
+
 /// Growth of the slowest motion of a scenario's loop on a straight, 1/s, with a law or by hand: below zero an error dies down.
 pub(crate) fn growth(scenario: &Scenario, law: Option<&Params>) -> f64 {
     let t_n = scenario.guidance().t_n;

@@ -18,7 +18,7 @@ use crate::Away;
 use crate::engine::{Watch, each, runs};
 use crate::error::StudyError;
 use crate::paper::stretched_curve;
-use crate::record::{growth, peak_m};
+use crate::record::{check_rigid, growth, peak_m};
 
 /// Speeds of the map, km/h.
 pub const SPEEDS_KMH: [f64; 12] = [
@@ -164,6 +164,7 @@ fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result
             "speed: a map over speeds has one at each place, and none that changes; leave [speed] out".into(),
         );
     }
+    check_rigid(base)?;
     let law = base.guidance().controller.law;
     if law != 0.0 {
         return Err(format!("guidance.law = {law}: a map is of the paper's law, 0").into());

@@ -1,20 +1,14 @@
-//! The linear form: exact steps, resonances, transfer functions, and margins of the loops through assist and driver.
-//!
-//! Its matrix is not written down a second time: the derivatives of [`Plant`] are linear where nothing bends, so that they are
-//! asked for one state after the other.
+//! The linear form: resonances, transfer functions, and margins of the loops through assist and driver.
 
 use std::f64::consts::{PI, TAU};
 
-use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::models::torsion_bar::{
+    Assist, BarPlant, COLUMN_GIVE, GUIDANCE, INPUTS, LAG, LATERAL, MOTOR, SENSOR, STATES, State, WHEEL,
+    WHEEL_GIVE, WHEEL_RATE, YAW, YAW_RATE, matrices,
+};
 use nalgebra::{Complex, DMatrix, DVector, SMatrix};
 use serde::Serialize;
-
-use crate::assist::Assist;
-use crate::plant::{
-    COLUMN_GIVE, GUIDANCE, Held, INPUTS, LAG, LATERAL, MOTOR, Plant, SENSOR, STATES, State, WHEEL,
-    WHEEL_GIVE, WHEEL_RATE, YAW, YAW_RATE,
-};
 
 /// Frequencies that margins are looked for at, Hz, and how many on each decade.
 const FROM_HZ: f64 = 0.01;
@@ -71,51 +65,14 @@ pub struct Linear {
     slope: f64,
 }
 
-fn matrices(plant: &Plant, v_m_per_s: f64) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, INPUTS>) {
-    let still = Held {
-        v_m_per_s,
-        ..Held::default()
-    };
-    let unit = |at: usize| -> State { std::array::from_fn(|j| if j == at { 1.0 } else { 0.0 }) };
-    // Of a torque so small that nothing is cut off.
-    const SMALL: f64 = 1e-3;
-    let a =
-        SMatrix::from_fn(|row, column| plant.rates(&unit(column).map(|x| SMALL * x), &still)[row] / SMALL);
-    let inputs = [
-        Held {
-            hands_nm: SMALL,
-            ..still
-        },
-        Held {
-            guidance_nm: SMALL,
-            ..still
-        },
-        Held {
-            sensor_adds_nm: SMALL,
-            ..still
-        },
-    ];
-    let b = SMatrix::from_fn(|row, column| plant.rates(&[0.0; STATES], &inputs[column])[row] / SMALL);
-    (a, b)
-}
-
-/// The exact step of 1 ms: what each state and each held input adds to each state.
-pub(crate) fn transition(plant: &Plant, v_m_per_s: f64) -> SMatrix<f64, STATES, { STATES + INPUTS }> {
-    let (a, b) = matrices(plant, v_m_per_s);
-    let mut all = SMatrix::<f64, { STATES + INPUTS }, { STATES + INPUTS }>::zeros();
-    all.fixed_view_mut::<STATES, STATES>(0, 0).copy_from(&a);
-    all.fixed_view_mut::<STATES, INPUTS>(0, STATES).copy_from(&b);
-    (all * STEP_S).exp().fixed_rows::<STATES>(0).into_owned()
-}
-
 impl Linear {
     /// The column of a plant at a speed, its assist at a working point of that torque of the bar. Friction, noise, range and limit are
     /// left out.
-    pub fn new(plant: &Plant, v_m_per_s: f64, torque_nm: f64) -> Self {
+    pub fn new(plant: &BarPlant, v_m_per_s: f64, torque_nm: f64) -> Self {
         let slope = plant.assist.slope(torque_nm, v_m_per_s);
         let smooth = plant.frictionless(Assist::Slope(slope));
         let (a, b) = matrices(&smooth, v_m_per_s);
-        let lead = smooth.bar.lead_s / smooth.bar.lag_s;
+        let lead = smooth.motor.lead_s / smooth.motor.lag_s;
         let mut compensated = [0.0; STATES];
         (compensated[SENSOR], compensated[LAG]) = (lead, 1.0 - lead);
         Self {
@@ -196,7 +153,7 @@ impl Linear {
             Hands::Free | Hands::Fixed => 0.0,
         };
         let by_motor = std::array::from_fn(|row| self.b[(row, 1)]);
-        // The arm feels the guidance's part of the motor through the bar ([`Plant::felt_nm`]).
+        // The arm feels the guidance's part of the motor through the bar ([`BarPlant::felt_nm`]).
         let part = Complex::new(self.b[(GUIDANCE, 1)], 0.0) / (s - self.a[(GUIDANCE, GUIDANCE)]);
         let felt = part / (1.0 + self.slope);
         let direct = self.answer(hands, s, &by_motor, 0.0)?;

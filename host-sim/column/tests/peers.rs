@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use haptic_column::linear::{Hands, Linear, margins};
-use haptic_column::{Assist, BarParameters, Curve};
+use haptic_sim::models::torsion_bar::{Assist, ColumnParameters, Curve};
 use haptic_sim::parts::Vehicle;
 
 use crate::physics::{V, acting, plant};
@@ -53,7 +53,7 @@ const DRIVE: [f64; 11] = [
 fn margins_are_those_of_python_control() {
     for (slope, kmh, hands, expected) in MARGINS {
         let linear = Linear::new(
-            &plant(BarParameters::default(), Assist::Slope(slope)),
+            &plant(ColumnParameters::default(), Assist::Slope(slope)),
             kmh / 3.6,
             0.0,
         );
@@ -82,7 +82,7 @@ fn margins_are_those_of_python_control() {
 fn a_gain_beyond_the_margin_swings() {
     for (slope, is_stable) in [(20.0 * 1.35, true), (20.0 * 1.37, false)] {
         let linear = Linear::new(
-            &plant(BarParameters::default(), Assist::Slope(slope)),
+            &plant(ColumnParameters::default(), Assist::Slope(slope)),
             5.0 / 3.6,
             0.0,
         );
@@ -92,9 +92,9 @@ fn a_gain_beyond_the_margin_swings() {
 
 #[test]
 fn a_drive_with_friction_and_a_curve_is_that_of_scipy() {
-    let bar = BarParameters {
+    let bar = ColumnParameters {
         sensor_noise_nm: 0.0,
-        ..BarParameters::default()
+        ..ColumnParameters::default()
     };
     let mut plant = plant(bar, Assist::Points(Curve::usual(1.0)));
     for k in 0..2000 {

@@ -2,7 +2,7 @@
 
 use haptic_column::study::assist::{Column, Group, Study};
 use haptic_column::study::{ColumnFile, sensors};
-use haptic_column::{BarParameters, Inject};
+use haptic_sim::models::torsion_bar::{ColumnParameters, Inject};
 
 /// By hand, from the points: at 60 km/h medium's slope is 0.5 on a straight and 3.5 at 2 N.m; held hands feel 1/(1 + g) of an overlay
 /// and g/(1 + g) of an offset, and the motor gives a free wheel 1 and g.
@@ -81,13 +81,14 @@ fn a_file_names_what_is_wrong_with_it() {
     );
     assert!(words("[colunm]\n").contains("unknown field `colunm`"));
     assert!(
-        words("[assist]\ntorque_nm = [0, 1]\nspeed_m_per_s = [0, 9]\nassist_nm = [[0, 1]]\n")
+        words("[assist.curve]\ntorque_nm = [0, 1]\nspeed_m_per_s = [0, 9]\nassist_nm = [[0, 1]]\n")
             .contains("a row for each speed")
     );
     let own = ColumnFile::from_toml(
-        "[assist]\ntorque_nm = [0, 1]\nspeed_m_per_s = [0, 9]\nassist_nm = [[0, 2], [0, 1]]\n",
+        "[assist.curve]\ntorque_nm = [0, 1]\nspeed_m_per_s = [0, 9]\nassist_nm = [[0, 2], [0, 1]]\n",
     )
     .unwrap();
     assert_eq!(own.curves()[0].0, "the file's");
-    assert_eq!(own.column, BarParameters::default());
+    assert_eq!(sensors::run(&own).unwrap().curve, "the file's");
+    assert_eq!(own.column, ColumnParameters::default());
 }

@@ -55,25 +55,50 @@ pub struct Channel {
     pub source: Source,
     /// What it is.
     pub meaning: &'static str,
-    /// Its value in a sample; a flag is 0 or 1.
+    /// Whether there are drives without it.
+    pub is_optional: bool,
+    /// Its value in a sample; a flag is 0 or 1; what a drive does not have is not a number.
     pub value: fn(&Sample) -> f64,
     set: fn(&mut Sample, f64),
 }
 
 /// A quantity or a flag, of a number.
 trait Value {
+    /// Whether there are drives without it.
+    const IS_OPTIONAL: bool = false;
     fn from_number(number: f64) -> Self;
+    fn number(self) -> f64;
 }
 
 impl Value for f64 {
     fn from_number(number: f64) -> Self {
         number
     }
+
+    fn number(self) -> f64 {
+        self
+    }
+}
+
+impl Value for Option<f64> {
+    const IS_OPTIONAL: bool = true;
+
+    fn from_number(number: f64) -> Self {
+        Some(number).filter(|number| !number.is_nan())
+    }
+
+    fn number(self) -> f64 {
+        self.unwrap_or(f64::NAN)
+    }
 }
 
 impl Value for bool {
     fn from_number(number: f64) -> Self {
         number != 0.0
+    }
+
+    fn number(self) -> f64 {
+        f64::from(self)
     }
 }
 
@@ -94,7 +119,8 @@ macro_rules! channels {
                 decimals: $decimals,
                 source: Source::$source,
                 meaning: concat!($($meaning),+),
-                value: |sample| f64::from(sample.$field),
+                is_optional: <$type as Value>::IS_OPTIONAL,
+                value: |sample| sample.$field.number(),
                 set: |sample, number| sample.$field = Value::from_number(number),
             },)*
         ];
@@ -139,6 +165,10 @@ channels! {
     /// Why the guidance is away: 0 where it is not; -1 torque lost, -2 lane preview lost, -3 request ended, -4 too slow,
     /// -5 no fault named; above 0 the ECU's fault word.
     unguided_cause: f64, "1", 0, Guidance;
+    /// T_tb, where the column has a torsion bar.
+    bar_torque_nm: Option<f64>, "N.m", 5, Vehicle;
+    /// Torque of the power assist there, seen at the wheel.
+    assist_torque_nm: Option<f64>, "N.m", 5, Vehicle;
 }
 
 /// What files of earlier versions do not have.
@@ -154,6 +184,14 @@ pub struct Trace {
 }
 
 impl Trace {
+    /// The channels that its drive has.
+    pub fn channels(&self) -> impl Iterator<Item = &'static Channel> {
+        let first = self.samples.first();
+        CHANNELS.iter().filter(move |channel| {
+            !channel.is_optional || first.is_some_and(|s| !(channel.value)(s).is_nan())
+        })
+    }
+
     /// Writes every sample as a row of a CSV table. A value that is not finite is an empty field.
     ///
     /// The first columns are those of a driver's log, so that a simulated run can be read wherever a log can.
@@ -161,9 +199,10 @@ impl Trace {
     /// # Errors
     /// What `out` says.
     pub fn write_csv(&self, out: impl Write) -> io::Result<()> {
-        let mut table = TableWriter::new(out, CHANNELS.map(|channel| channel.name))?;
+        let channels: Vec<_> = self.channels().collect();
+        let mut table = TableWriter::new(out, channels.iter().map(|channel| channel.name))?;
         for sample in &self.samples {
-            table.row(CHANNELS.map(|channel| match (channel.value)(sample) {
+            table.row(channels.iter().map(|channel| match (channel.value)(sample) {
                 value if value.is_finite() => fixed(value, channel.decimals),
                 _ => String::new(),
             }))?;
@@ -190,7 +229,7 @@ impl Trace {
         let mut table = TableReader::new(source)?;
         let place = |channel: Channel| {
             let found = table.header().iter().position(|name| *name == channel.name);
-            if found.is_none() && !LATER_CHANNELS.contains(&channel.name) {
+            if found.is_none() && !channel.is_optional && !LATER_CHANNELS.contains(&channel.name) {
                 return Err(TableError::MissingColumn(channel.name.into()));
             }
             Ok(found)

@@ -22,6 +22,8 @@ pub enum Stream {
     Design,
     /// The roots of a sweep's drives.
     Drives,
+    /// Noise of a torsion bar's sensor.
+    Bar,
 }
 
 impl Stream {
@@ -37,6 +39,7 @@ impl Stream {
             Self::Gyro => 6,
             Self::Design => 7,
             Self::Drives => 8,
+            Self::Bar => 9,
         };
         split_mix(split_mix(root) ^ name)
     }

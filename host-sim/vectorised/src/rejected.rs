@@ -34,6 +34,8 @@ macro_rules! reasons {
 reasons! {
     /// A camera whose pictures come late, that is blind at times, or that jumps to another line.
     Camera "a camera that is late, blind at times, or on another line";
+    /// A steering column with a torsion bar.
+    TorsionBar "a torsion bar";
     /// Another law than the paper's.
     AnotherLaw "another law than the paper's";
     /// Exact sensors, past the bus.
@@ -126,6 +128,9 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
         world: _,
         sensor_errors: _,
         tolerances: _,
+        column,
+        // Only a bar has one.
+        assist: _,
         seed: _,
     } = scenario.values();
     let Failure {
@@ -140,6 +145,7 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
     let heard_m_per_s = f64::from(speed_heard(scenario)) * (1.0 / ONE);
     let reasons = [
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
+        (column.has_bar(), Reason::TorsionBar),
         (guided && params.law != 0.0, Reason::AnotherLaw),
         (guided && *sensors == Sensors::Exact, Reason::ExactSensors),
         (

@@ -22,7 +22,7 @@ use haptic_sim::models::plant::Transition;
 use haptic_sim::models::road::Centreline;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::{STEP_S, STEPS_PER_SECOND, step_of, wrapped};
-use haptic_sim::parts::{ByReliance, DriverVehicle, PaperPair};
+use haptic_sim::parts::{ByReliance, DriverVehicle, Mover, PaperPair};
 use haptic_sim::scenario::{FailureKind, Scenario};
 use haptic_sim::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Sensing};
 use haptic_sim::unguided::Cause;
@@ -115,13 +115,16 @@ impl<const N: usize> Runs<N> {
     }
 
     pub(super) fn begin(&mut self, lane: usize, number: usize, scenario: &Scenario) {
-        let (road, mut pair) = (scenario.course().centreline(), PaperPair::new(scenario));
+        let (road, pair) = (scenario.course().centreline(), PaperPair::new(scenario));
         let plan = Plan::new(scenario, pair.look_ahead_s());
         self.worlds.begin(lane, scenario, &road, &plan);
         let has_banks = !scenario.course().is_level();
-        self.worlds
-            .nonlinear
-            .begin(lane, pair.nonlinear.take(), has_banks);
+        let nonlinear = match pair.mover {
+            Mover::Nonlinear(plant) => Some(plant),
+            // A bar is rejected before its run begins.
+            Mover::Linear | Mover::Bar(_) => None,
+        };
+        self.worlds.nonlinear.begin(lane, nonlinear, has_banks);
         self.speeds.begin(lane, scenario, &plan);
         self.senses.begin(lane, Sensing::new(scenario));
         self.ecus.begin(lane, scenario);
@@ -374,6 +377,8 @@ impl<const N: usize> Runs<N> {
                 guidance_torque_nm: torque_nm[l],
                 guidance_limited: self.ecus.limited[l] != 0,
                 unguided_cause: slot.unguided_cause,
+                bar_torque_nm: None,
+                assist_torque_nm: None,
             });
         }
     }

@@ -11,6 +11,7 @@ use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::nonlinear::{Tyres, WorldParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::models::tolerances::Tolerances;
+use haptic_sim::models::torsion_bar::{ColumnKind, ColumnParameters};
 use haptic_sim::population::LaneKeeper;
 use haptic_sim::scenario::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors, Speed,
@@ -386,6 +387,14 @@ fn what_cannot_be_vectorised_is_named_and_rejected() {
     let exact = Scenario::builder().sensors(Sensors::Exact).build().unwrap();
     assert_eq!(unsupported_reason(&exact), Some(Reason::ExactSensors));
     assert_eq!(unsupported_reason(&Scenario::default()), None);
+    let bar = Scenario::builder().column(ColumnParameters {
+        kind: ColumnKind::TorsionBar,
+        ..ColumnParameters::default()
+    });
+    assert_eq!(
+        unsupported_reason(&bar.build().unwrap()),
+        Some(Reason::TorsionBar)
+    );
     let mut guidance = GuidanceParameters::default();
     guidance.controller.law = DRIVER_ACTIVITY;
     let another = Scenario::builder().guidance(guidance).build().unwrap();

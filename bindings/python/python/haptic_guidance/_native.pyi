@@ -144,6 +144,37 @@ class TolerancesTable(TypedDict, total=False):
     camera_yaw_rad: float
     yaw_rate_bias_rad_per_s: float
 
+class ColumnTable(TypedDict, total=False):
+    kind: Literal["rigid", "torsion-bar"]
+    j_w_kg_m2: float
+    b_w_nms_per_rad: float
+    k_tb_nm_per_rad: float
+    b_tb_nms_per_rad: float
+    upper_friction_nm: float
+    lower_friction_nm: float
+    friction_give_rad: float
+    sensor_range_nm: float
+    sensor_resolution_nm: float
+    sensor_noise_nm: float
+    sensor_offset_nm: float
+    sensor_lag_s: float
+    angle: Literal["wheel", "column"]
+    fault: Literal["none", "sensor-offset", "sensor-drift", "sensor-stuck", "sensor-doubled", "broken-bar", "assist-lost", "assist-runaway"]
+    fault_time_s: float
+
+class CurveTable(TypedDict):
+    torque_nm: list[float]
+    speed_m_per_s: list[float]
+    assist_nm: list[list[float]]
+
+class AssistTable(TypedDict, total=False):
+    inject: Literal["overlay", "offset"]
+    lead_s: float
+    lag_s: float
+    motor_lag_s: float
+    limit_nm: float
+    curve: Union[Literal["none", "light", "medium", "strong"], CurveTable]
+
 class ScenarioFields(TypedDict, total=False):
     course: Union[str, PathLike[str], CourseTable]
     road: str
@@ -163,6 +194,8 @@ class ScenarioFields(TypedDict, total=False):
     world: WorldTable
     sensor_errors: SensorErrorsTable
     tolerances: TolerancesTable
+    column: ColumnTable
+    assist: AssistTable
 
 @final
 class Scenario:

@@ -13,7 +13,7 @@ use crate::engine::{Faults, Watch, failures, runs};
 use crate::error::StudyError;
 use crate::metrics::measured;
 use crate::places::seed_of;
-use crate::record::growth;
+use crate::record::{check_rigid, growth};
 use crate::statistics::rms;
 
 /// What a set does with a driver, means over places and seeds: peak lateral error to the middle of the lane (m), mean of the size of T_d
@@ -149,6 +149,7 @@ impl DesignGuidance {
                 let growth = |gains: Gains| -> Result<f64, StudyError> {
                     let scenario = self.scenario(&stage.scenarios[0], *member, gains, 1)?;
                     let scenario = scenario.to_builder().speed_kmh(kmh).build()?;
+                    check_rigid(&scenario)?;
                     Ok(growth(&scenario, Some(&scenario.guidance().controller)))
                 };
                 unstable += u32::from(growth(gains)? >= 0.0 && growth(published())? < 0.0);

@@ -4,20 +4,20 @@
 //! Law (9) guides in float64, without the ECU: its envelope, modes and checks are not part of this. Drivers keep the gains that the paper
 //! found on its column, which has no assist.
 
+use haptic_sim::fields::InFile;
 use haptic_sim::guidance::{FloatLaw, Guidance, NoGuidance};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::road::{Course, CourseError, Segment};
-use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::models::torsion_bar::{
+    Assist, AssistParameters, BarPlant, ColumnParameters, CurveChoice, Inject,
+};
 use haptic_sim::participants::participants;
-use haptic_sim::parts::{DriverVehicle, PaperDriver, PaperVehicle, Parts};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, ScenarioError};
 use haptic_sim::{Scenario, Simulation};
 use serde::Serialize;
 
 use super::ColumnFile;
 use crate::linear::{Hands, Linear, Margins, margins};
-use crate::{Assist, BarParameters, ColumnError, Inject, Plant, ThroughBar};
 
 /// Speeds of the tables, km/h; drives are at [`DRIVEN_KMH`].
 pub const SPEEDS_KMH: [f64; 5] = [10.0, 30.0, 60.0, 100.0, 130.0];
@@ -183,7 +183,7 @@ pub struct GroupRow {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
     /// The column.
-    pub column: BarParameters,
+    pub column: InFile<ColumnParameters>,
     /// What is felt.
     pub felt: Vec<Felt>,
     /// The assist's loop.
@@ -195,9 +195,6 @@ pub struct Results {
 /// Why a case cannot be driven.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
-    /// A column that cannot be.
-    #[error(transparent)]
-    Column(#[from] ColumnError),
     /// A scenario that cannot be.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -243,40 +240,52 @@ impl Study {
         cases
     }
 
-    fn plant(&self, assist: Assist, inject: Inject) -> Result<Plant, ColumnError> {
-        let bar = BarParameters {
-            inject,
-            ..self.file.column
-        };
-        Plant::new(
-            bar,
-            assist,
-            &VehicleParameters::default(),
-            &WorldParameters::default(),
-            1,
-        )
+    /// The car with another assist, and the guidance brought in there.
+    fn plant(&self, assist: Assist, inject: Inject) -> Result<BarPlant, ScenarioError> {
+        let mut plant = self.file.plant()?.with_assist(assist);
+        plant.motor.inject = inject;
+        Ok(plant)
     }
 
-    /// The plant of a column; none for the paper's.
-    fn plant_of(&self, column: Column) -> Result<Option<Plant>, ColumnError> {
+    /// The linear form of a case's column at the working point of a straight; none of the paper's.
+    fn linear_of(&self, column: Column) -> Result<Option<Linear>, ScenarioError> {
         let plant = match column {
             Column::Rigid => return Ok(None),
-            Column::Smooth => {
-                let bar = self.file.column.linear();
-                Plant::new(
-                    bar,
-                    Assist::None,
-                    &VehicleParameters::default(),
-                    &WorldParameters::default(),
-                    1,
-                )
-            }
-            Column::Bar => self.plant(Assist::None, Inject::Overlay),
-            Column::Assisted(k, inject) => {
-                self.plant(Assist::Points(self.file.curves()[k].1.clone()), inject)
-            }
+            Column::Smooth | Column::Bar => self.plant(Assist::None, Inject::Overlay)?,
+            Column::Assisted(k, inject) => self.plant(self.file.curves()[k].1.assist(), inject)?,
         };
-        plant.map(Some)
+        Ok(Some(Linear::new(&plant, DRIVEN_KMH / 3.6, WORKING_NM[0])))
+    }
+
+    /// The drive of a case.
+    fn scenario(&self, case: &Case, kind: FailureKind) -> Result<Scenario, CaseError> {
+        let failure = Failure {
+            kind,
+            time_s: LOST_AT_S,
+            ..Failure::default()
+        };
+        let with = |column: ColumnParameters, curve, inject| ColumnFile {
+            column,
+            assist: AssistParameters {
+                curve,
+                inject,
+                ..self.file.assist.clone()
+            },
+        };
+        let (column, none) = (self.file.column, CurveChoice::default());
+        let file = match case.column {
+            Column::Rigid => None,
+            Column::Smooth => Some(with(column.linear(), none, Inject::Overlay)),
+            Column::Bar => Some(with(column, none, Inject::Overlay)),
+            Column::Assisted(k, inject) => Some(with(column, self.file.curves().swap_remove(k).1, inject)),
+        };
+        let builder = Scenario::builder().course(road()?).speed_kmh(DRIVEN_KMH);
+        let builder = builder.driver(case.driver).gains(case.gains).failure(failure);
+        Ok(match file {
+            Some(file) => file.with(builder),
+            None => builder,
+        }
+        .build()?)
     }
 
     /// Drives a case.
@@ -284,26 +293,20 @@ impl Study {
     /// # Errors
     /// A column or a scenario that cannot be.
     pub fn drive(&self, case: &Case) -> Result<Driven, CaseError> {
-        let plant = self.plant_of(case.column)?;
         let peak = |kind| -> Result<Option<f64>, CaseError> {
-            let scenario = scenario(case, kind)?;
-            let driver = PaperDriver::new(&scenario);
-            Ok(match plant.clone() {
-                None => peak_m(
-                    &scenario,
-                    Parts::new(driver, PaperVehicle::new(&scenario)),
-                    case.group,
-                ),
-                Some(plant) => peak_m(&scenario, ThroughBar::new(driver, plant), case.group),
+            let scenario = self.scenario(case, kind)?;
+            Ok(match case.group {
+                Group::Manual => peak_of(&scenario, NoGuidance),
+                Group::Guided | Group::Conditions => {
+                    peak_of(&scenario, FloatLaw::new(scenario.controller_params()))
+                }
             })
         };
         let lost_peak_m = match case.group {
             Group::Manual => None,
             Group::Guided | Group::Conditions => peak(FailureKind::Torque)?,
         };
-        let linear = plant
-            .as_ref()
-            .map(|plant| Linear::new(plant, DRIVEN_KMH / 3.6, WORKING_NM[0]));
+        let linear = self.linear_of(case.column)?;
         let (driver, gains) = (&case.driver, case.gains);
         let peak_m = peak(FailureKind::None)?;
         let eyes = linear
@@ -326,20 +329,20 @@ impl Study {
     ///
     /// # Errors
     /// A column that cannot be.
-    pub fn summarise(&self, cases: &[Case], driven: &[Driven]) -> Result<Results, ColumnError> {
+    pub fn summarise(&self, cases: &[Case], driven: &[Driven]) -> Result<Results, ScenarioError> {
         Ok(Results {
-            column: self.file.column,
+            column: InFile(self.file.column),
             felt: self.felt()?,
             loops: self.loops()?,
             drivers: self.groups(cases, driven),
         })
     }
 
-    fn felt(&self) -> Result<Vec<Felt>, ColumnError> {
+    fn felt(&self) -> Result<Vec<Felt>, ScenarioError> {
         let mut rows = Vec::new();
-        for (curve, points) in self.file.curves() {
+        for (curve, choice) in self.file.curves() {
             for inject in INJECTS {
-                let plant = self.plant(Assist::Points(points.clone()), inject)?;
+                let plant = self.plant(choice.assist(), inject)?;
                 for speed_kmh in SPEEDS_KMH {
                     for working_nm in WORKING_NM {
                         let v = speed_kmh / 3.6;
@@ -356,7 +359,7 @@ impl Study {
                             inject,
                             speed_kmh,
                             working_nm,
-                            slope: points.slope(working_nm, v),
+                            slope: plant.assist.slope(working_nm, v),
                             felt_nm,
                             motor_held_nm,
                             motor_free_nm: free.map_or(f64::NAN, |[_, motor]| motor),
@@ -368,11 +371,11 @@ impl Study {
         Ok(rows)
     }
 
-    fn loops(&self) -> Result<Vec<LoopRow>, ColumnError> {
+    fn loops(&self) -> Result<Vec<LoopRow>, ScenarioError> {
         let mut rows = Vec::new();
-        for (curve, points) in self.file.curves() {
+        for (curve, choice) in self.file.curves() {
             for speed_kmh in SPEEDS_KMH {
-                let slope = points.steepest(speed_kmh / 3.6);
+                let slope = choice.assist().steepest(speed_kmh / 3.6);
                 let plant = self.plant(Assist::Slope(slope), Inject::Overlay)?;
                 let linear = Linear::new(&plant, speed_kmh / 3.6, 0.0);
                 let margins = [Hands::Free, Hands::Fixed].map(|hands| {
@@ -449,33 +452,8 @@ fn road() -> Result<Course, CourseError> {
     Course::new("first bend of paper-course", 3.6, segments)
 }
 
-fn scenario(case: &Case, kind: FailureKind) -> Result<Scenario, CaseError> {
-    let failure = Failure {
-        kind,
-        time_s: LOST_AT_S,
-        ..Failure::default()
-    };
-    let builder = Scenario::builder().course(road()?).speed_kmh(DRIVEN_KMH);
-    Ok(builder
-        .driver(case.driver)
-        .gains(case.gains)
-        .failure(failure)
-        .build()?)
-}
-
-fn peak_m(scenario: &Scenario, driver_vehicle: impl DriverVehicle, group: Group) -> Option<f64> {
-    match group {
-        Group::Manual => peak_of(scenario, driver_vehicle, NoGuidance),
-        Group::Guided | Group::Conditions => peak_of(
-            scenario,
-            driver_vehicle,
-            FloatLaw::new(scenario.controller_params()),
-        ),
-    }
-}
-
-fn peak_of(scenario: &Scenario, driver_vehicle: impl DriverVehicle, guidance: impl Guidance) -> Option<f64> {
-    let run = Simulation::with_driver_vehicle(scenario, driver_vehicle, guidance).run();
+fn peak_of(scenario: &Scenario, guidance: impl Guidance) -> Option<f64> {
+    let run = Simulation::with(scenario, guidance).run();
     let errors = run
         .trace
         .samples

@@ -2,25 +2,28 @@
 //! threads and progress are whose program it is.
 //!
 //! - [`assist`]: overlay or offset, what hands feel of it, margins, what a sudden loss costs.
+//! - [`hands`]: whether a hand is at the wheel, and how soon that is known.
 //! - [`sensors`]: the hands' torque by the observer of `haptic-observer`, by the angle's sensor.
 
 pub mod assist;
+pub mod hands;
 pub mod sensors;
 
+use haptic_sim::Scenario;
+use haptic_sim::fields::InFile;
+use haptic_sim::models::torsion_bar::{
+    AssistParameters, BarPlant, ColumnKind, ColumnParameters, CurveChoice, Usual,
+};
+use haptic_sim::scenario::{ScenarioBuilder, ScenarioError};
 use serde::Deserialize;
 
-use crate::{BarParameters, ColumnError, Curve};
-use haptic_sim::models::vehicle::VehicleParameters;
-
-/// A column of one's own, as a file (TOML) has it.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A column of one's own, as a file (TOML) has it: the two tables of a scenario. It has a bar whatever its kind says.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColumnFile {
-    /// Wheel, bar, sensor, compensator and motor; what is not there has its default.
-    #[serde(default)]
-    pub column: BarParameters,
-    /// An assist in the place of the three of usual practice.
-    pub assist: Option<Curve>,
+    /// Wheel, bar and sensor; what is not there has its default.
+    pub column: ColumnParameters,
+    /// Compensator, motor, and an assist in the place of the three of usual practice.
+    pub assist: AssistParameters,
 }
 
 /// Why a file is no column.
@@ -31,7 +34,15 @@ pub enum FileError {
     Text(#[from] toml::de::Error),
     /// A value that cannot be.
     #[error(transparent)]
-    Column(#[from] ColumnError),
+    Scenario(#[from] ScenarioError),
+}
+
+#[derive(Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[derive(Default)]
+struct Tables {
+    column: InFile<ColumnParameters>,
+    assist: InFile<AssistParameters>,
 }
 
 impl ColumnFile {
@@ -40,22 +51,40 @@ impl ColumnFile {
     /// # Errors
     /// The field, its value and its range.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
-        let file: Self = toml::from_str(text)?;
-        file.column.check(&VehicleParameters::default())?;
-        if let Some(curve) = &file.assist {
-            curve.check()?;
-        }
+        let tables: Tables = toml::from_str(text)?;
+        let (column, assist) = (tables.column.0, tables.assist.0);
+        let file = Self { column, assist };
+        file.with(Scenario::builder()).build()?;
         Ok(file)
     }
 
+    /// A scenario with this column.
+    fn with(&self, builder: ScenarioBuilder) -> ScenarioBuilder {
+        let kind = ColumnKind::TorsionBar;
+        let column = ColumnParameters { kind, ..self.column };
+        builder.column(column).assist(self.assist.clone())
+    }
+
+    /// The file's car on the paper's course.
+    fn plant(&self) -> Result<BarPlant, ScenarioError> {
+        Ok(BarPlant::new(&self.with(Scenario::builder()).build()?))
+    }
+
     /// The curves, by name: the file's, or the three of usual practice.
-    pub fn curves(&self) -> Vec<(&'static str, Curve)> {
-        match &self.assist {
-            Some(curve) => vec![("the file's", curve.clone())],
-            None => [("light", 0.5), ("medium", 1.0), ("strong", 1.25)]
-                .map(|(name, factor)| (name, Curve::usual(factor)))
-                .into(),
+    pub fn curves(&self) -> Vec<(&'static str, CurveChoice)> {
+        let named = |usual: Usual| (usual.name(), CurveChoice::Usual(usual));
+        match &self.assist.curve {
+            CurveChoice::Usual(Usual::None) => Usual::ALL.map(named).into(),
+            CurveChoice::Usual(usual) => vec![named(*usual)],
+            points @ CurveChoice::Points(_) => vec![("the file's", points.clone())],
         }
+    }
+
+    /// The curve that a study of one takes: the file's, or medium.
+    fn one_curve(&self) -> (&'static str, CurveChoice) {
+        let mut curves = self.curves();
+        let medium = curves.iter().position(|(name, _)| *name == Usual::Medium.name());
+        curves.swap_remove(medium.unwrap_or(0))
     }
 }
 

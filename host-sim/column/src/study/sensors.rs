@@ -1,21 +1,20 @@
 //! What a sensor has to deliver: how late and how wrong the observer of `haptic-observer` tells the torque of the hands, by the steps and
 //! the rate of the angle's sensor, the observer's bandwidth, and what is believed of J_w and K_tb.
 //!
-//! The car is that of the column with the medium assist at 60 km/h; its angle is the column's. In the first half the hands steer with
+//! The car has the file's assist, or the medium one, and goes at 60 km/h; its angle is the column's. In the first half the hands steer with
 //! [`HANDS_NM`] at 0.4 Hz and half of it at 1.1 Hz while the guidance moves the column; in the second nobody holds the wheel.
 
 use std::f64::consts::TAU;
 
 use haptic_core::quantity::{Radians, Torque};
 use haptic_observer::{Observer, Parameters, Reading, Setup, SetupError, State};
-use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::sensors::camera_looks;
-use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::models::torsion_bar::ColumnParameters;
 use haptic_sim::parts::{Acting, Vehicle};
+use haptic_sim::scenario::ScenarioError;
 use serde::Serialize;
 
 use super::{ColumnFile, rms};
-use crate::{Assist, ColumnError, Plant};
 
 /// Steps of the angle's sensor, degrees.
 pub const STEPS_DEG: [f64; 3] = [0.005, 0.02, 0.1];
@@ -51,6 +50,11 @@ impl Rate {
             Self::Camera => 120.0,
         }
     }
+
+    /// Whether an angle is sampled in a step.
+    pub(super) fn samples(self, step: u32) -> bool {
+        self == Self::EveryStep || camera_looks(step)
+    }
 }
 
 /// An observer with a sensor.
@@ -77,6 +81,8 @@ pub struct Row {
 /// What came of all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
+    /// The assist.
+    pub curve: &'static str,
     /// What the bar's sensor itself is off by, N.m: its own reading taken for the hands', without any lag.
     pub bar_alone_nm: f64,
     /// What the bar's sensor says where nobody holds the wheel, N.m.
@@ -107,7 +113,7 @@ impl Results {
 pub enum SensorsError {
     /// A column that cannot be.
     #[error(transparent)]
-    Column(#[from] ColumnError),
+    Scenario(#[from] ScenarioError),
     /// A column that the observer cannot be set up for.
     #[error("the observer: {0}")]
     Setup(SetupError),
@@ -120,14 +126,8 @@ struct Seen {
     column_rad: f64,
 }
 
-fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ColumnError> {
-    let curves = file.curves();
-    let curve = curves
-        .iter()
-        .find(|(name, _)| *name == "medium")
-        .unwrap_or(&curves[0]);
-    let (vehicle, world) = (VehicleParameters::default(), WorldParameters::default());
-    let mut plant = Plant::new(file.column, Assist::Points(curve.1.clone()), &vehicle, &world, 45)?;
+fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ScenarioError> {
+    let mut plant = file.plant()?.with_assist(file.one_curve().1.assist());
     let mut seen = Vec::with_capacity(HALF);
     for k in 0..HALF {
         let t = 1e-3 * k as f64;
@@ -153,6 +153,20 @@ fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ColumnError> {
     Ok(seen)
 }
 
+/// An observer's parameters, all known, for an angle of the column.
+pub(super) fn believed(column: &ColumnParameters, rate: Rate, bandwidth: f64) -> Parameters {
+    Parameters {
+        j_w: column.j_w_kg_m2,
+        b_w: column.b_w_nms_per_rad,
+        friction_nm: column.upper_friction_nm,
+        friction_give_rad: column.friction_give_rad,
+        k_tb: column.k_tb_nm_per_rad,
+        sample_ms: 1000.0 / rate.hz(),
+        bandwidth,
+        ..Parameters::default()
+    }
+}
+
 /// What an observer says of a record, less the hands' torque of its lag ago: root of the mean square, N.m.
 fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
     let observer = Observer::new(Setup::new(of).map_err(SensorsError::Setup)?);
@@ -160,7 +174,7 @@ fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Resul
     let lag = f64::from(observer.setup().lag_us()) * 1e-3;
     let (whole, rest) = (lag.floor() as usize, lag.fract());
     let errors = seen.iter().enumerate().map(|(k, now)| {
-        let is_sampled = rate == Rate::EveryStep || camera_looks(k as u32);
+        let is_sampled = rate.samples(k as u32);
         let angle = is_sampled.then(|| Radians::from_rad((now.column_rad / step_rad).round() * step_rad));
         let bar_torque = Torque::from_nm(now.bar_nm);
         let found = observer
@@ -185,16 +199,7 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
     for rate in RATES {
         for step_deg in STEPS_DEG {
             for bandwidth in BANDWIDTHS.into_iter().filter(|w| *w <= rate.hz()) {
-                let right = Parameters {
-                    j_w: column.j_w_kg_m2,
-                    b_w: column.b_w_nms_per_rad,
-                    friction_nm: column.upper_friction_nm,
-                    friction_give_rad: column.friction_give_rad,
-                    k_tb: column.k_tb_nm_per_rad,
-                    sample_ms: 1000.0 / rate.hz(),
-                    bandwidth,
-                    ..Parameters::default()
-                };
+                let right = believed(column, rate, bandwidth);
                 let error = |of: Parameters| deviation(&of, &held, step_deg, rate);
                 let wrong = |change: &dyn Fn(f64) -> Parameters, by: f64| {
                     Ok::<_, SensorsError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
@@ -226,6 +231,7 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
     }
     let bar = |seen: &[Seen]| rms(seen.iter().skip(SETTLES).map(|now| now.bar_nm - now.hands_nm));
     Ok(Results {
+        curve: file.one_curve().0,
         bar_alone_nm: bar(&held),
         bar_no_hand_nm: bar(&free),
         rows,

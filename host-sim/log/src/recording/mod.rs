@@ -297,7 +297,7 @@ impl From<Vec<Group>> for Recording {
 
 impl From<&Trace> for Recording {
     fn from(trace: &Trace) -> Self {
-        let channels = CHANNELS[1..].iter().map(|channel| Series {
+        let channels = trace.channels().skip(1).map(|channel| Series {
             name: channel.name.into(),
             unit: channel.unit.into(),
             source: channel.source.to_string(),

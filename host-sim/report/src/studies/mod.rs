@@ -48,7 +48,7 @@ fn ended(line: Series, why: Option<&str>) -> impl Iterator<Item = Series> + use<
 
 /// Where on the road the failure comes.
 fn failure_marker(scenario: &Scenario, samples: &[Sample]) -> Option<Marker> {
-    let time_s = scenario.failure().at_s()?;
+    let time_s = (scenario.failure().at_s()).or(scenario.column().fault_at_s())?;
     let sample = samples.iter().find(|sample| sample.time_s >= time_s)?;
     Some(Marker::new("failure", sample.s_m))
 }

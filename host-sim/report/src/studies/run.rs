@@ -80,6 +80,18 @@ fn figure(single: &SingleRun) -> Figure {
         panel("Driver torque", "N.m", |s| s.driver_torque_nm),
         panel("Guidance torque", "N.m", |s| s.guidance_torque_nm),
     ];
+    if single.scenario.column().has_bar() {
+        panels[2] = {
+            let line = |name, style, value: fn(&Sample) -> Option<f64>| {
+                let points = samples.iter().filter_map(|s| Some((s.s_m, value(s)?))).collect();
+                ended(Series::line(name, style, points), diverged)
+            };
+            let hands = line("hands", 1, |s| Some(s.driver_torque_nm));
+            let series = hands.into_iter().chain(line("bar", 2, |s| s.bar_torque_nm));
+            Axis::new("Hands and bar", "N.m").panel(series)
+        };
+        panels.push(panel("Assist", "N.m", |s| s.assist_torque_nm.unwrap_or(f64::NAN)));
+    }
     if single.scenario.changes_speed() {
         panels.push(panel("Speed", "km/h", |s| 3.6 * s.speed_m_per_s));
     }

@@ -10,7 +10,7 @@ use super::Fields;
 
 /// A table as it stands in a file; a field that is not there has its default.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct InFile<T>(pub(crate) T);
+pub struct InFile<T>(pub T);
 
 impl<T: Fields> Serialize for InFile<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

@@ -13,8 +13,7 @@ use serde::ser::{Serialize, SerializeMap};
 
 use crate::range::{RangeError, in_range};
 
-pub(crate) use in_file::InFile;
-pub use in_file::from_numbers;
+pub use in_file::{InFile, from_numbers};
 /// Why numbers by name are no table: a name that there is not, or one that lacks.
 pub use toml::de::Error as NotATable;
 
@@ -184,7 +183,7 @@ macro_rules! fields {
         }
     ) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[derive(Debug, Clone, PartialEq)]
         pub struct $Struct {
             $($(#[doc = $meaning])+ #[doc = concat!("\n\n`", $table, ".", $name, "`, ", $unit)]
             pub $field: $type $(<$of>)?,)*

@@ -15,6 +15,7 @@ use crate::fields::fields;
 
 fields! {
     /// What sensors add to the truth.
+    #[derive(Copy)]
     SensorErrors, "sensor_errors" {
         /// bias of the driver torque
         torque_bias_nm: f64 = 0.0, "torque_bias_nm", "", "N.m", Between(-2.0, 2.0);

@@ -14,6 +14,7 @@ use crate::fields::{Range, fields};
 
 fields! {
     /// Tables 4, 7 and 8, without remnant. The gains of the arm depend on the condition and are given apart ([`ArmGains`]).
+    #[derive(Copy)]
     DriverParameters, "driver" {
         /// visual gain on e_y at the near point, equation (7)
         a_1: f64 = 0.1, "a_1_rad_per_m", "a_1", "rad/m", Between(0.0, 10.0);
@@ -49,6 +50,7 @@ fields! {
 
 fields! {
     /// The arm in the table of a driver.
+    #[derive(Copy)]
     ArmInFile, "driver" {
         /// gain on the target angle; without it the condition's
         k_d: Option<f64> = None, "k_d_nm_per_rad", "K_d", "N.m/rad", ArmGains::K_D;

@@ -13,6 +13,7 @@ pub mod plant;
 pub mod road;
 pub mod sensors;
 pub mod tolerances;
+pub mod torsion_bar;
 pub mod vehicle;
 
 use std::f64::consts::{PI, TAU};

@@ -245,6 +245,11 @@ impl Plant {
         self.advance(before, distance_m);
     }
 
+    /// Takes over an arm's torque, N.m.
+    pub fn set_arm_nm(&mut self, arm_nm: f64) {
+        self.linear[ARM] = arm_nm;
+    }
+
     /// Position of the centre of gravity, m.
     pub fn position_m(&self) -> [f64; 2] {
         [self.x_m, self.y_m]

@@ -18,6 +18,7 @@ const LOAD_PLACE: f64 = 0.75;
 
 fields! {
     /// How far cars of one kind differ.
+    #[derive(Copy)]
     Tolerances, "tolerances" {
         /// which car of the population drives; without it `seed` draws one
         car: Option<u64> = None, "car", "", "", Whole;

@@ -6,6 +6,7 @@ use crate::fields::fields;
 
 fields! {
     /// Table 9, SI units. Every value has to be positive.
+    #[derive(Copy)]
     VehicleParameters, "vehicle" {
         /// mass
         m: f64 = 1100.0, "m_kg", "m", "kg", Between(100.0, 50_000.0);

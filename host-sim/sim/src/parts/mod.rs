@@ -15,8 +15,8 @@ mod vehicle;
 
 pub use driver::{Driver, DriverView, NoDriver, PaperDriver};
 pub(crate) use paper_pair::Notices;
-pub use paper_pair::{ByReliance, PaperPair};
-pub use vehicle::{Acting, Motion, PaperVehicle, Vehicle};
+pub use paper_pair::{ByReliance, Mover, PaperPair};
+pub use vehicle::{Acting, BarState, Motion, PaperVehicle, Vehicle};
 
 /// A driver and a vehicle as one system: what a simulation moves.
 pub trait DriverVehicle {
@@ -37,6 +37,11 @@ pub trait DriverVehicle {
 
     /// The guidance torque of the last step as the motor measures it, N.m.
     fn motor_torque_nm(&self) -> f64;
+
+    /// The torsion bar of its column, if it has one.
+    fn bar(&self) -> Option<BarState> {
+        None
+    }
 }
 
 /// Any driver in any vehicle.
@@ -83,5 +88,9 @@ impl<D: Driver, V: Vehicle> DriverVehicle for Parts<D, V> {
 
     fn motor_torque_nm(&self) -> f64 {
         self.motor_torque_nm
+    }
+
+    fn bar(&self) -> Option<BarState> {
+        self.vehicle.bar()
     }
 }

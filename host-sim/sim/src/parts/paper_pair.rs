@@ -1,17 +1,29 @@
 //! The paper's driver in the paper's vehicle, as one system.
 
-use super::{Acting, DriverVehicle, DriverView, Motion};
+use super::{Acting, BarState, DriverVehicle, DriverView, Motion, Vehicle};
+use crate::models::arm::Arm;
 use crate::models::driver::{ArmGains, DriverParameters, Remnant, Vision};
 use crate::models::hands_answer::HandsAnswer;
 use crate::models::nonlinear::NonlinearPlant;
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::step_of;
 use crate::models::tolerances::Car;
+use crate::models::torsion_bar::BarPlant;
 use crate::scenario::Scenario;
 use crate::seeds::Stream;
 
-/// The driver of equations (7) and (8) whose arm is a state of the vehicle's plant: the exact step of the linear one, or
-/// the nonlinear plant that a scenario asks for.
+/// What moves arm, column and vehicle.
+#[derive(Debug, Clone)]
+pub enum Mover {
+    /// The exact step of the linear plant.
+    Linear,
+    /// Runge-Kutta, where a scenario asks for what the linear plant cannot do.
+    Nonlinear(Box<NonlinearPlant>),
+    /// A wheel on a torsion bar, held by an arm that is stepped beside it: angle and felt torque of a step's start hold for it.
+    Bar(Box<(BarPlant, Arm)>),
+}
+
+/// The driver of equations (7) and (8) whose arm is a state of the vehicle's plant, but with a torsion bar.
 #[derive(Debug, Clone)]
 pub struct PaperPair {
     look_ahead_s: [f64; 2],
@@ -29,8 +41,8 @@ pub struct PaperPair {
     /// Torque on the column beside the arm's and the guidance's, N.m.
     held_nm: f64,
     plant: Plant,
-    /// What moves in the place of the linear plant, where a scenario asks for what that cannot do.
-    pub nonlinear: Option<Box<NonlinearPlant>>,
+    /// What moves them.
+    pub mover: Mover,
     motor_torque_nm: f64,
 }
 
@@ -61,7 +73,15 @@ impl PaperPair {
         let Car { world, vehicle, .. } = scenario.car();
         // The linear plant is exact at one speed alone.
         let is_linear = world.is_ideal() && scenario.course().is_level() && !scenario.changes_speed();
-        let seed = Stream::World.seed(scenario.seed());
+        let mover = if scenario.column().has_bar() {
+            let arm = Arm::new(driver, scenario.gains());
+            Mover::Bar(Box::new((BarPlant::new(scenario), arm)))
+        } else if is_linear {
+            Mover::Linear
+        } else {
+            let seed = Stream::World.seed(scenario.seed());
+            Mover::Nonlinear(Box::new(NonlinearPlant::new(world, &vehicle, driver, seed)))
+        };
         Self {
             look_ahead_s: [driver.t_n, driver.t_f],
             vision: Vision::new(driver),
@@ -74,7 +94,7 @@ impl PaperPair {
             target_rad: [0.0; 2],
             held_nm: 0.0,
             plant: Plant::default(),
-            nonlinear: (!is_linear).then(|| Box::new(NonlinearPlant::new(world, &vehicle, driver, seed))),
+            mover,
             motor_torque_nm: 0.0,
         }
     }
@@ -126,15 +146,27 @@ impl DriverVehicle for PaperPair {
         };
         let is_manual = self.takes_over || self.notices.is_manual();
         let transition = self.arm.at(self.step, is_manual);
-        self.motor_torque_nm = match &mut self.nonlinear {
-            None => {
+        self.motor_torque_nm = match &mut self.mover {
+            Mover::Linear => {
                 self.plant.step(transition, &input);
                 acting.guidance_torque_nm
             }
-            Some(plant) => {
+            Mover::Nonlinear(plant) => {
                 let (speeds, gains) = (acting.speed_m_per_s, transition.gains());
                 plant.step(&mut self.plant, speeds, gains, input, acting.bank_rad);
                 plant.motor_torque_nm()
+            }
+            Mover::Bar(bar) => {
+                let (plant, arm) = bar.as_mut();
+                arm.gains = transition.gains();
+                let (wheel_rad, felt_nm) = (self.plant.wheel_angle_rad(), plant.felt_nm());
+                let hands = Acting {
+                    driver_torque_nm: self.plant.arm_torque_nm() + self.held_nm,
+                    ..*acting
+                };
+                let motor_nm = plant.step(&hands);
+                self.plant = plant.place(arm.step(self.target_rad[1], wheel_rad, felt_nm));
+                motor_nm
             }
         };
         self.target_rad[0] = self.target_rad[1];
@@ -161,6 +193,14 @@ impl DriverVehicle for PaperPair {
     #[inline]
     fn motor_torque_nm(&self) -> f64 {
         self.motor_torque_nm
+    }
+
+    #[inline]
+    fn bar(&self) -> Option<BarState> {
+        match &self.mover {
+            Mover::Linear | Mover::Nonlinear(_) => None,
+            Mover::Bar(bar) => bar.0.bar(),
+        }
     }
 }
 

@@ -33,6 +33,21 @@ pub struct Motion {
     pub wheel_rate_rad_per_s: f64,
 }
 
+/// What passes through a steering column with a torsion bar, and what is told of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BarState {
+    /// T_tb as its sensor reads it, N.m: what the ECU is told in the place of the hands' torque.
+    pub sensor_nm: f64,
+    /// T_tb, N.m.
+    pub torque_nm: f64,
+    /// The motor's torque without the guidance's part, N.m.
+    pub assist_nm: f64,
+    /// T_h as hands that hold the wheel feel it, N.m.
+    pub felt_nm: f64,
+    /// The angle that the ECU is told, rad.
+    pub told_angle_rad: f64,
+}
+
 /// Something that is steered by torques on its column. It starts at the origin, moving along x.
 pub trait Vehicle {
     /// Moves for 1 ms; returns the guidance torque as the motor measures it, N.m: the one that acts, if the motor is ideal.
@@ -40,6 +55,11 @@ pub trait Vehicle {
 
     /// Where it is, and how it moves.
     fn motion(&self) -> Motion;
+
+    /// Its torsion bar, if it has one: otherwise the column's sensors measure hands and wheel.
+    fn bar(&self) -> Option<BarState> {
+        None
+    }
 
     /// The point that lies `distance_m` ahead along the direction of movement, m.
     fn ahead_m(&self, distance_m: f64) -> [f64; 2] {
@@ -69,6 +89,10 @@ impl Vehicle for PaperVehicle {
 
     fn motion(&self) -> Motion {
         self.0.motion()
+    }
+
+    fn bar(&self) -> Option<BarState> {
+        self.0.bar()
     }
 
     fn ahead_m(&self, distance_m: f64) -> [f64; 2] {

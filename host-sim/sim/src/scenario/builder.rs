@@ -14,6 +14,7 @@ use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
 use crate::models::tolerances::Tolerances;
+use crate::models::torsion_bar::{AssistParameters, ColumnParameters};
 use crate::models::vehicle::VehicleParameters;
 
 /// Chooses the values of a [`Scenario`]; each has a default.
@@ -43,6 +44,46 @@ pub enum ScenarioError {
         what: String,
         /// What to do about it.
         cure: &'static str,
+    },
+    /// The wheel has more of something than wheel and column together.
+    #[error("column.{field} = {value} {unit} leaves the column none of the vehicle's {all} {unit}")]
+    WheelHasAll {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// That of wheel and column together.
+        all: f64,
+    },
+    /// Points of an assist that are no curve.
+    #[error("{field} has to be: {is}")]
+    Curve {
+        /// The field.
+        field: &'static str,
+        /// What it has to be.
+        is: &'static str,
+    },
+    /// A value of a bar or its assist, where there is none.
+    #[error("{0} takes column.kind = \"torsion-bar\"")]
+    WithoutBar(String),
+    /// Guidance in front of an assist that there is not.
+    #[error(
+        "assist.inject = \"offset\" takes an assist.curve other than \"none\": without one the guidance turns nothing"
+    )]
+    OffsetOfNothing,
+    /// A value of the rigid column, where there is a bar.
+    #[error(
+        "{field} = {value} is of a rigid column, and column.kind is \"torsion-bar\": leave it out, {instead} has it"
+    )]
+    OfTheRigidColumn {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What a column with a bar has in its place.
+        instead: &'static str,
     },
     /// A course with less than a second to drive.
     #[error(
@@ -180,6 +221,18 @@ impl ScenarioBuilder {
         self
     }
 
+    /// What the steering column is.
+    pub fn column(mut self, column: ColumnParameters) -> Self {
+        self.values.column = column;
+        self
+    }
+
+    /// What amplifies the torque of its bar.
+    pub fn assist(mut self, assist: AssistParameters) -> Self {
+        self.values.assist = assist;
+        self
+    }
+
     /// Root of all random numbers.
     pub fn seed(mut self, seed: u64) -> Self {
         self.values.seed = seed;
@@ -211,6 +264,13 @@ impl ScenarioBuilder {
         values.world.check()?;
         values.sensor_errors.check()?;
         values.tolerances.check()?;
+        values.column.check()?;
+        values.column.check_share(&values.vehicle)?;
+        values.assist.check()?;
+        values.assist.curve.check()?;
+        values
+            .column
+            .check_with(&values.assist, &values.world, &values.tolerances)?;
         let scenario = Scenario { values, setup, speed };
         scenario.check_length()?;
         scenario.check_manual()?;

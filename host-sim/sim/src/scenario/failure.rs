@@ -38,6 +38,7 @@ impl FieldValue for FailureKind {}
 
 fields! {
     /// A failure and its time.
+    #[derive(Copy)]
     Failure, "failure" {
         /// what fails: nothing, the torque drops to zero, or the lane preview stops and the ECU hands over
         kind: FailureKind = FailureKind::None, "kind", "", "", OneOf(&["none", "torque", "input"]);
@@ -65,6 +66,7 @@ impl Failure {
 
 fields! {
     /// A driver who changes in mid-drive, before a failure is noticed.
+    #[derive(Copy)]
     DriverChange, "driver_change", complete {
         /// when the driver changes, before the run ends
         time_s: f64 = 0.0, "time_s", "", "s", Between(0.0, 1e6);

@@ -13,6 +13,7 @@ use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
 use crate::models::road::{COURSE_FIELDS, Course, LaneChoice, PAPER_COURSE, SEGMENT_FIELDS, SegmentFile};
 use crate::models::tolerances::Tolerances;
+use crate::models::torsion_bar::{AssistParameters, ColumnParameters};
 use crate::models::vehicle::VehicleParameters;
 
 /// Parses a scenario; only its course is checked.
@@ -67,6 +68,8 @@ pub(super) fn parse(
         .world(file.world.unwrap_or_default().0)
         .sensor_errors(file.sensor_errors.unwrap_or_default().0)
         .tolerances(file.tolerances.unwrap_or_default().0)
+        .column(file.column.unwrap_or_default().0)
+        .assist(file.assist.unwrap_or_default().0)
         .seed(file.seed))
 }
 
@@ -88,6 +91,8 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         world,
         sensor_errors,
         tolerances,
+        column,
+        assist,
         seed,
     } = &scenario.values;
     let built_in = *course == Course::paper();
@@ -127,6 +132,8 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         world: unless_default(*world),
         sensor_errors: unless_default(*sensor_errors),
         tolerances: unless_default(*tolerances),
+        column: unless_default(*column),
+        assist: unless_default(assist.clone()),
     })
 }
 
@@ -142,7 +149,7 @@ type DriverInFile = (DriverParameters, ArmInFile);
 pub type FieldsOf = fn() -> Vec<&'static Field>;
 
 /// The lists of a scenario's tables, by the tables' names.
-pub const TABLES: [(&str, FieldsOf); 8] = [
+pub const TABLES: [(&str, FieldsOf); 10] = [
     (DriverInFile::TABLE, DriverInFile::fields),
     (VehicleParameters::TABLE, VehicleParameters::fields),
     (GuidanceInFile::TABLE, GuidanceInFile::fields),
@@ -151,6 +158,8 @@ pub const TABLES: [(&str, FieldsOf); 8] = [
     (WorldParameters::TABLE, WorldParameters::fields),
     (SensorErrors::TABLE, SensorErrors::fields),
     (Tolerances::TABLE, Tolerances::fields),
+    (ColumnParameters::TABLE, ColumnParameters::fields),
+    (AssistParameters::TABLE, AssistParameters::fields),
 ];
 
 /// The fields of a table of a scenario file, `segment` for those of a course; none of what is no list.
@@ -270,6 +279,10 @@ struct ScenarioFile {
     sensor_errors: Option<InFile<SensorErrors>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     tolerances: Option<InFile<Tolerances>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    column: Option<InFile<ColumnParameters>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    assist: Option<InFile<AssistParameters>>,
 }
 
 impl Default for ScenarioFile {
@@ -293,6 +306,8 @@ impl Default for ScenarioFile {
             world: None,
             sensor_errors: None,
             tolerances: None,
+            column: None,
+            assist: None,
         }
     }
 }

@@ -136,6 +136,7 @@ impl Fields for ControllerInFile {
 
 fields! {
     /// What is beside the controller in the table.
+    #[derive(Copy)]
     CameraInFile, "guidance" {
         /// look-ahead time of the camera's near point
         t_n: f64 = 0.3, "t_n_s", "t'_n", "s", Between(0.0, 5.0);

@@ -31,6 +31,7 @@ use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
 use crate::models::tolerances::{Car, Tolerances};
+use crate::models::torsion_bar::{AssistParameters, ColumnParameters};
 use crate::models::vehicle::VehicleParameters;
 use crate::seeds::Stream;
 
@@ -120,6 +121,7 @@ impl Scenario {
         let times = [
             ("failure.time_s", self.failure().at_s()),
             ("driver_change.time_s", change_s),
+            ("column.fault_time_s", self.column().fault_at_s()),
         ];
         for (field, time_s) in times {
             if let Some(time_s) = time_s {
@@ -231,6 +233,16 @@ impl Scenario {
     /// How far cars of this kind differ.
     pub fn tolerances(&self) -> &Tolerances {
         &self.values.tolerances
+    }
+
+    /// What the steering column is.
+    pub fn column(&self) -> &ColumnParameters {
+        &self.values.column
+    }
+
+    /// What amplifies the torque of its bar.
+    pub fn assist(&self) -> &AssistParameters {
+        &self.values.assist
     }
 
     /// The car that drives: what vehicle, world and sensor errors say, with what the tolerances draw.

@@ -8,6 +8,7 @@ use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
 use crate::models::road::Course;
 use crate::models::tolerances::Tolerances;
+use crate::models::torsion_bar::{AssistParameters, ColumnParameters};
 use crate::models::vehicle::VehicleParameters;
 
 /// The controller and the camera that feeds it.
@@ -65,6 +66,10 @@ pub struct ScenarioValues {
     pub sensor_errors: SensorErrors,
     /// How far cars of this kind differ.
     pub tolerances: Tolerances,
+    /// What the steering column is.
+    pub column: ColumnParameters,
+    /// What amplifies the torque of its bar, if it has one.
+    pub assist: AssistParameters,
     /// Root of all random numbers.
     pub seed: u64,
 }
@@ -86,6 +91,8 @@ impl Default for ScenarioValues {
             world: WorldParameters::default(),
             sensor_errors: SensorErrors::default(),
             tolerances: Tolerances::default(),
+            column: ColumnParameters::default(),
+            assist: AssistParameters::default(),
             seed: 1,
         }
     }

@@ -34,8 +34,8 @@ use crate::scenario::Scenario;
 use crate::unguided::{Circumstances, Watch};
 use plan::AskingDriver;
 pub use plan::Plan;
-use record::record;
 pub use record::{SAMPLE_RATE_HZ, STEPS_PER_SAMPLE};
+use record::{Truth, record};
 pub use run::{Ending, Outcome, Run, observe, simulate};
 pub use sensing::Sensing;
 
@@ -146,7 +146,10 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             wheel_rate_rad_per_s: motion.wheel_rate_rad_per_s,
             speed_m_per_s: self.speed_m_per_s,
             yaw_rate_rad_per_s: motion.yaw_rate_rad_per_s,
-            guidance_torque_nm: self.driver_vehicle.motor_torque_nm(),
+            guidance_torque_nm: match self.driver_vehicle.bar() {
+                Some(bar) => bar.felt_nm,
+                None => self.driver_vehicle.motor_torque_nm(),
+            },
             warning: self.told[0],
             asks_for_hands: self.told[1],
             is_lost: lost.any(),
@@ -182,13 +185,15 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
         };
         let faults = self.plan.faults(self.step).or(action.world);
         let view = self.perceived(preview, points_m, &motion, faults);
+        let hands_nm = self.driver_vehicle.drive(&view, action.hand_torque_nm);
+        let bar = self.driver_vehicle.bar();
         let observation = Observation {
             step: self.step,
             lane: lane.filter(|_| looks && !faults.lane_lost),
             lane_age_ms: 0,
-            driver_torque_nm: self.driver_vehicle.drive(&view, action.hand_torque_nm),
-            wheel_angle_rad: motion.wheel_angle_rad,
-            motor_torque_nm: view.guidance_torque_nm,
+            driver_torque_nm: bar.map_or(hands_nm, |bar| bar.sensor_nm),
+            wheel_angle_rad: bar.map_or(motion.wheel_angle_rad, |bar| bar.told_angle_rad),
+            motor_torque_nm: self.driver_vehicle.motor_torque_nm(),
             speed_m_per_s: self.speed_m_per_s,
             yaw_rate_rad_per_s: Some(motion.yaw_rate_rad_per_s),
             request: self.plan.request(action, self.request.asks),
@@ -209,9 +214,17 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             decided
         };
         let camera = lane.filter(|_| is_sample);
-        let sample = camera.and_then(|camera| self.sample(&observation, &motion, [preview, camera], applied));
+        let truth = Truth {
+            motion,
+            seen: [preview, camera.unwrap_or_default()],
+            speed_m_per_s: observation.speed_m_per_s,
+            hands_nm,
+            bar,
+            applied,
+        };
+        let sample = camera.and_then(|_| self.sample(&truth));
         if self.ending.is_none() {
-            self.move_on(observation.driver_torque_nm, applied.torque_nm);
+            self.move_on(hands_nm, applied.torque_nm);
         }
         Some(Outcome {
             preview,
@@ -239,21 +252,14 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
 
     /// A sample for the record; none, and the end of the run, where the vehicle has left the road.
     #[inline]
-    fn sample(
-        &mut self,
-        observation: &Observation,
-        motion: &Motion,
-        seen: [LaneErrors; 2],
-        applied: Actuation,
-    ) -> Option<Sample> {
-        let [x, y] = motion.position_m;
+    fn sample(&mut self, truth: &Truth) -> Option<Sample> {
+        let [x, y] = truth.motion.position_m;
         match self.road.project(x, y, &mut self.body) {
             Some(projection) if projection.offset_m.abs() <= DIVERGED_M => {
                 self.last_s_m = projection.s_m;
                 self.place_m = projection.s_m;
                 self.lateral_error_m = Some(projection.offset_m);
-                let cause = self.watch.cause();
-                Some(record(motion, &projection, observation, seen, applied, cause))
+                Some(record(self.step, truth, &projection, self.watch.cause()))
             }
             _ => {
                 self.ending = Some(Ending::Diverged { s_m: self.last_s_m });

@@ -22,6 +22,7 @@ impl FieldValue for Tyres {}
 
 fields! {
     /// What is less than ideal in the world.
+    #[derive(Copy)]
     WorldParameters, "world" {
         /// tyres in proportion to slip, or up to the friction of the road with a falling trail
         tyres: Tyres = Tyres::Linear, "tyres", "", "", OneOf(&["linear", "saturating"]);

@@ -20,7 +20,7 @@ pub struct Wind {
 }
 
 impl Wind {
-    pub(super) fn new(world: &WorldParameters, seed: u64) -> Self {
+    pub(in crate::models) fn new(world: &WorldParameters, seed: u64) -> Self {
         let decay = (-std::f64::consts::TAU * world.gust_corner_hz * STEP_S).exp();
         Self {
             steady_n: world.wind_n,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ColumnError;
+use crate::scenario::ScenarioError;
 
 /// A curve by points: linear between them, the last one beyond them, odd in the torque.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,6 +14,86 @@ pub struct Curve {
     pub speed_m_per_s: Vec<f64>,
     /// A row for each speed, a torque of the motor for each torque of the bar, N.m, from 0 and never falling.
     pub assist_nm: Vec<Vec<f64>>,
+}
+
+/// Curves of usual practice, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Usual {
+    /// No assist.
+    #[default]
+    None,
+    /// Half of medium.
+    Light,
+    /// A largest slope of 4 at 60 km/h and 20 at a standstill.
+    Medium,
+    /// 1.25 of medium.
+    Strong,
+}
+
+impl Usual {
+    /// The curves that assist.
+    pub const ALL: [Self; 3] = [Self::Light, Self::Medium, Self::Strong];
+
+    /// Its name in a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Light => "light",
+            Self::Medium => "medium",
+            Self::Strong => "strong",
+        }
+    }
+
+    /// What it amplifies.
+    pub fn assist(self) -> Assist {
+        match self {
+            Self::None => Assist::None,
+            Self::Light => Assist::Points(Curve::usual(0.5)),
+            Self::Medium => Assist::Points(Curve::usual(1.0)),
+            Self::Strong => Assist::Points(Curve::usual(1.25)),
+        }
+    }
+}
+
+/// A curve as a file chooses it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "\"none\", \"light\", \"medium\", \"strong\", or a table of torque_nm, speed_m_per_s and assist_nm"
+)]
+pub enum CurveChoice {
+    /// By name.
+    Usual(Usual),
+    /// By points.
+    Points(Curve),
+}
+
+impl Default for CurveChoice {
+    fn default() -> Self {
+        Self::Usual(Usual::None)
+    }
+}
+
+impl CurveChoice {
+    /// Whether it can be read.
+    ///
+    /// # Errors
+    /// As [`Curve::check`].
+    pub fn check(&self) -> Result<(), ScenarioError> {
+        match self {
+            Self::Usual(_) => Ok(()),
+            Self::Points(curve) => curve.check(),
+        }
+    }
+
+    /// What it amplifies.
+    pub fn assist(&self) -> Assist {
+        match self {
+            Self::Usual(usual) => usual.assist(),
+            Self::Points(curve) => Assist::Points(curve.clone()),
+        }
+    }
 }
 
 /// What amplifies the torque of the bar.
@@ -59,9 +139,9 @@ impl Curve {
     ///
     /// # Errors
     /// The field, and what it has to be.
-    pub fn check(&self) -> Result<(), ColumnError> {
+    pub fn check(&self) -> Result<(), ScenarioError> {
         let rises = |points: &[f64]| points.len() > 1 && points.windows(2).all(|two| two[0] < two[1]);
-        let shape = |field, is| Err(ColumnError::Curve { field, is });
+        let shape = |field, is| Err(ScenarioError::Curve { field, is });
         let numbers = self.assist_nm.iter().flatten();
         if !self
             .torque_nm
@@ -70,25 +150,25 @@ impl Curve {
             .chain(numbers)
             .all(|x| x.is_finite())
         {
-            return shape("assist", "finite numbers");
+            return shape("assist.curve", "finite numbers");
         }
         if !rises(&self.torque_nm) || self.torque_nm[0] != 0.0 {
-            return shape("assist.torque_nm", "two numbers or more, rising from 0");
+            return shape("assist.curve.torque_nm", "two numbers or more, rising from 0");
         }
         if !rises(&self.speed_m_per_s) || self.speed_m_per_s[0] < 0.0 {
             return shape(
-                "assist.speed_m_per_s",
+                "assist.curve.speed_m_per_s",
                 "two numbers or more, rising, none below 0",
             );
         }
         if self.assist_nm.len() != self.speed_m_per_s.len() {
-            return shape("assist.assist_nm", "a row for each speed");
+            return shape("assist.curve.assist_nm", "a row for each speed");
         }
         let falls = |row: &Vec<f64>| row.windows(2).any(|two| two[1] < two[0]);
         let wrong = |row: &Vec<f64>| row.len() != self.torque_nm.len() || row[0] != 0.0 || falls(row);
         if self.assist_nm.iter().any(wrong) {
             return shape(
-                "assist.assist_nm",
+                "assist.curve.assist_nm",
                 "in each row a number for each torque, from 0, never falling",
             );
         }
@@ -128,6 +208,15 @@ impl Assist {
             Self::None => 0.0,
             Self::Slope(slope) => slope * torque_nm,
             Self::Points(curve) => curve.at(torque_nm, v_m_per_s),
+        }
+    }
+
+    /// Its largest slope at a speed.
+    pub fn steepest(&self, v_m_per_s: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Slope(slope) => *slope,
+            Self::Points(curve) => curve.steepest(v_m_per_s),
         }
     }
 
