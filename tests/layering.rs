@@ -79,6 +79,7 @@ const PACKAGES: Arrows = &[
     ("core", &[]),
     ("core/diag", &["haptic-core"]),
     ("core/observer", &["haptic-core"]),
+    ("core/secoc", &["haptic-core"]),
     ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
