@@ -80,7 +80,7 @@ const PACKAGES: Arrows = &[
     ("core/diag", &["haptic-core"]),
     ("core/observer", &["haptic-core"]),
     ("core/secoc", &["haptic-core"]),
-    ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
+    ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep", "haptic-secoc"]),
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),

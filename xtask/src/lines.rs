@@ -20,7 +20,7 @@ pub(crate) const BUDGETS: [(&str, usize); 27] = [
     ("core/observer", 400),
     ("core/secoc", 800),
     ("examples", 200),
-    ("firmware", 2_800),
+    ("firmware", 3_000),
     ("firmware/lockstep", 200),
     ("host-sim", 3_200),
     ("host-sim/analysis", 9_100),
