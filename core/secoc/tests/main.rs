@@ -1,6 +1,7 @@
 //! Authentication, judged by published vectors, by a bus with an eavesdropper, and by the DBC file.
 
 mod dbc;
+mod frames;
 mod fresh;
 mod verifier;
 
