@@ -1,5 +1,6 @@
 //! Authentication, judged by published vectors, by a bus with an eavesdropper, and by the DBC file.
 
+mod attacks;
 mod dbc;
 mod frames;
 mod fresh;
