@@ -59,10 +59,15 @@ class Prover:
         self.database, self.crc, self.number = cantools.database.load_file(DBC), crc, number
         self.names = self.database.get_message_by_name("Offer").get_signal_by_name("Offer_Message").choices
         self.questions = {name: self.database.get_message_by_name(f"{name}Question") for name in map(str, self.names.values())}
-        self.senders = {}
+        self.senders, self.used = {}, set()
         for name, question in self.questions.items():
             identifier = question.frame_id - 0x400
             self.senders[identifier] = Sender(identifier, camera if name == "LanePreview" else host)
+
+    def is_synchronised(self):
+        """Whether some message was sent, and each that was has an epoch."""
+        used = [self.senders[identifier] for identifier in self.used]
+        return bool(used) and all(sender.epoch is not None for sender in used)
 
     def prove(self, frame):
         """What to send in place of a frame."""
@@ -70,6 +75,7 @@ class Prover:
         if sender is None:
             return [frame]
         sender.is_in_use = True
+        self.used.add(frame.arbitration_id)
         if sender.epoch is None:
             return [frame]
         data = bytearray(frame.data)

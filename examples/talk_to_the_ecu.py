@@ -164,6 +164,13 @@ class Run:
             faults = f", {', '.join(self.ecu.faults)}" if self.ecu.faults else ""
             print(f"{self.ms / 1000:7.3f} s  {self.ecu.mode}  {self.ecu.torque:+.3f} N.m{faults}", flush=True)
 
+    def synchronise(self):
+        """Until the ECU can verify what is sent."""
+        while self.prover and not self.prover.is_synchronised():
+            self.step()
+            if self.ms == 5000:
+                self.fail("no epoch within 5 s")
+
     def until(self, mode, seconds):
         for _ in range(round(1000 * seconds)):
             self.step()
@@ -199,7 +206,9 @@ def main():
 
         prover = Prover(lambda data: protected_crc(database.get_message_by_name("Request"), data))
     with clock.bus:
-        drive(Run(clock, database, prover), arguments.seconds)
+        run = Run(clock, database, prover)
+        run.synchronise()
+        drive(run, arguments.seconds)
 
 
 def drive(run, seconds):

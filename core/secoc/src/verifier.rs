@@ -238,14 +238,14 @@ impl Verifier {
         way.receiver.accept(mac_of(macs, proven.info.sender), text, proof)
     }
 
-    /// Keeps a question until its offer is due. One that waits for it stays, so that who floods the bus with questions later is behind it.
+    /// Keeps a question until its offer is due; a later one takes its place, as its sender awaits no other answer.
     fn ask(&mut self, place: usize, frame: &Frame) {
         let Some(number) = frame.payload::<4>() else {
             self.refuse(place, Refusal::Length);
             return;
         };
         if let Some(way) = self.ways.get_mut(place) {
-            way.question.get_or_insert(u32::from_le_bytes(*number));
+            way.question = Some(u32::from_le_bytes(*number));
         }
     }
 
