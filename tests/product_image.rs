@@ -77,11 +77,11 @@ pub(crate) struct Ecu {
 
 impl Ecu {
     fn start() -> Self {
-        Self::run(&[])
+        Self::run("3", &[])
     }
 
-    /// With further options of `cargo xtask qemu`.
-    pub(crate) fn run(options: &[&OsStr]) -> Self {
+    /// Runs it at another pace of the machine's clock, with further options of `cargo xtask qemu`.
+    pub(crate) fn run(icount: &str, options: &[&OsStr]) -> Self {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
         let mut runner = Command::new(cargo)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
@@ -92,7 +92,7 @@ impl Ecu {
                 "--can",
                 "stdio",
                 "--icount",
-                "3",
+                icount,
                 "--timeout",
                 "300",
             ])
