@@ -142,21 +142,34 @@ class InLockStep(LockStep):
 
 
 class Run:
-    def __init__(self, clock, database):
+    def __init__(self, clock, database, prover=None):
         self.clock, self.vehicle, self.ecu, self.ms = clock, Vehicle(database), Ecu(database), 0
         self.latest, self.reported = 0.0, None
+        self.prover, self.questions = prover, []
 
     def step(self):
         """One millisecond."""
-        for frame in self.clock.tick(self.ms, self.vehicle.frames(self.ms)):
+        frames, self.questions = self.questions, []
+        for frame in self.vehicle.frames(self.ms):
+            frames += self.prover.prove(frame) if self.prover else [frame]
+        for frame in self.clock.tick(self.ms, frames):
             if self.ecu.hear(frame):
                 self.vehicle.torque = self.ecu.torque
+            elif self.prover:
+                self.questions += self.prover.hear(frame)
         self.ms += 1
         self.latest = max(self.latest, self.clock.late_ms(self.ms))
         if self.ecu.mode != self.reported or self.ms % 5000 == 0:
             self.reported = self.ecu.mode
             faults = f", {', '.join(self.ecu.faults)}" if self.ecu.faults else ""
             print(f"{self.ms / 1000:7.3f} s  {self.ecu.mode}  {self.ecu.torque:+.3f} N.m{faults}", flush=True)
+
+    def synchronise(self):
+        """Until the ECU can verify what is sent."""
+        while self.prover and not self.prover.is_synchronised():
+            self.step()
+            if self.ms == 5000:
+                self.fail("no epoch within 5 s")
 
     def until(self, mode, seconds):
         for _ in range(round(1000 * seconds)):
@@ -182,12 +195,20 @@ def main():
     parser.add_argument("--lockstep", action="store_true", help="the image is lockstep: time is the ECU's own")
     parser.add_argument("--seconds", type=float, default=60, help="how long to stay engaged (default: 60)")
     parser.add_argument("--dbc", default=DBC, help="the description of the bus (default: core/haptic.dbc)")
+    parser.add_argument("--authenticate", action="store_true", help="prove the frames, as `ecu run --authenticate aes-cmac` wants it")
     arguments = parser.parse_args()
 
     database = cantools.database.load_file(arguments.dbc)
     clock = (InLockStep if arguments.lockstep else OnTheWall)(arguments.channel)
+    prover = None
+    if arguments.authenticate:
+        from authentication import Prover
+
+        prover = Prover(lambda data: protected_crc(database.get_message_by_name("Request"), data))
     with clock.bus:
-        drive(Run(clock, database), arguments.seconds)
+        run = Run(clock, database, prover)
+        run.synchronise()
+        drive(run, arguments.seconds)
 
 
 def drive(run, seconds):

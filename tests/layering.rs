@@ -79,7 +79,8 @@ const PACKAGES: Arrows = &[
     ("core", &[]),
     ("core/diag", &["haptic-core"]),
     ("core/observer", &["haptic-core"]),
-    ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
+    ("core/secoc", &["haptic-core"]),
+    ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep", "haptic-secoc"]),
     ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
@@ -89,7 +90,7 @@ const PACKAGES: Arrows = &[
     ("host-sim/vehicle", &["haptic-log"]),
     ("host-sim/analysis", &["haptic-log"]),
     ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
-    ("host-sim/pil", &["haptic-core", "haptic-diag", "haptic-lockstep"]),
+    ("host-sim/pil", &["haptic-core", "haptic-diag", "haptic-lockstep", "haptic-secoc"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-column", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),
     // Beside these the command line's own parts, of host-sim.

@@ -1,6 +1,7 @@
 //! What a customer would check, across the crates; one program, a module a subject. `cargo test -p haptic-guidance pil::` runs
 //! one of them.
 
+mod authentication;
 mod availability;
 mod closed_loop;
 mod design;

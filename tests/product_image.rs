@@ -4,6 +4,7 @@
 //! The client's clock is the ECU's: it sends what is due whenever a torque frame comes. Frames are taken apart
 //! here by hand, from `core/haptic.dbc`.
 
+use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
@@ -13,21 +14,21 @@ use haptic_core::bus::slcan;
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 
 /// `Guidance_Mode` of the DBC file.
-const ACTIVE: u64 = 2;
+pub(crate) const ACTIVE: u64 = 2;
 const FAULT: u64 = 5;
 /// Law (9) at rest: K_1*a1'*e_y' = 0.25*2*0.5 = 0.25 N.m, in LSBs of 2^-12 N.m.
-const EXPECTED_RAW: i16 = 1024;
+pub(crate) const EXPECTED_RAW: i16 = 1024;
 /// A boot has this many milliseconds to guide.
 const PATIENCE: u32 = 8_000;
 /// The machine counts instructions and is never late, but on a busy host this client may be: its frames are then too
 /// old, and the ECU hands over. It may need another boot.
-const BOOTS: u32 = 8;
+pub(crate) const BOOTS: u32 = 8;
 
 /// The torque frame's signals.
-struct Guidance {
+pub(crate) struct Guidance {
     counter: u8,
-    torque_raw: i16,
-    mode: u64,
+    pub(crate) torque_raw: i16,
+    pub(crate) mode: u64,
 }
 
 /// CRC-8, polynomial 0x2F, init and xorout 0xFF, bit by bit.
@@ -44,7 +45,7 @@ fn crc8(bytes: impl Iterator<Item = u8>) -> u8 {
 }
 
 /// A `t0C08..` line taken apart; None for any other line. Panics where the CRC does not fit.
-fn guidance(line: &str) -> Option<Guidance> {
+pub(crate) fn guidance(line: &str) -> Option<Guidance> {
     const DATA_IDS: [u8; 16] = [
         0xD9, 0xAD, 0xC1, 0x0B, 0x75, 0xF8, 0xE0, 0x7C, 0x7A, 0xE6, 0xAE, 0x92, 0x9B, 0x3E, 0xEA, 0x5E,
     ];
@@ -68,7 +69,7 @@ fn guidance(line: &str) -> Option<Guidance> {
 }
 
 /// The image in QEMU. QEMU ends when its input does, which is at the latest when this test dies.
-struct Ecu {
+pub(crate) struct Ecu {
     runner: Child,
     to: Option<ChildStdin>,
     from: BufReader<std::process::ChildStdout>,
@@ -76,6 +77,11 @@ struct Ecu {
 
 impl Ecu {
     fn start() -> Self {
+        Self::run("3", &[])
+    }
+
+    /// Runs it at another pace of the machine's clock, with further options of `cargo xtask qemu`.
+    pub(crate) fn run(icount: &str, options: &[&OsStr]) -> Self {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
         let mut runner = Command::new(cargo)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
@@ -86,10 +92,11 @@ impl Ecu {
                 "--can",
                 "stdio",
                 "--icount",
-                "3",
+                icount,
                 "--timeout",
                 "300",
             ])
+            .args(options)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -100,7 +107,7 @@ impl Ecu {
         Self { runner, to, from }
     }
 
-    fn send(&mut self, bytes: &[u8]) {
+    pub(crate) fn send(&mut self, bytes: &[u8]) {
         self.to
             .as_mut()
             .unwrap()
@@ -108,7 +115,7 @@ impl Ecu {
             .expect("the image takes bytes");
     }
 
-    fn line(&mut self) -> String {
+    pub(crate) fn line(&mut self) -> String {
         let mut line = Vec::new();
         self.from.read_until(b'\r', &mut line).unwrap();
         assert!(
@@ -131,7 +138,7 @@ impl Ecu {
     }
 
     /// Hangs up and returns the log.
-    fn end(mut self) -> String {
+    pub(crate) fn end(mut self) -> String {
         drop(self.to.take());
         std::io::copy(&mut self.from, &mut std::io::sink()).unwrap();
         let log = self.rest_of_log();
@@ -141,8 +148,8 @@ impl Ecu {
 }
 
 /// What the other senders put on the bus at millisecond `k`: half a metre to the left of the target's line, car
-/// and wheel at rest relative to it. Guidance is asked for anew every two seconds.
-fn frames(k: u32, motor_raw: i16) -> Vec<Frame> {
+/// and wheel at rest relative to it.
+pub(crate) fn frames(k: u32, motor_raw: i16, engage: bool) -> Vec<Frame> {
     let mut frames = Vec::new();
     if k.is_multiple_of(8) {
         let lane = LanePreview {
@@ -169,7 +176,6 @@ fn frames(k: u32, motor_raw: i16) -> Vec<Frame> {
             }
             .encode((k / 10) as u8),
         );
-        let engage = k % 2000 >= 800;
         frames.push(
             Request {
                 engage,
@@ -221,7 +227,8 @@ fn guide(ecu: &mut Ecu) -> bool {
         if now.mode == FAULT {
             return false;
         }
-        for frame in frames(k, now.torque_raw) {
+        // Guidance is asked for anew every two seconds.
+        for frame in frames(k, now.torque_raw, k % 2000 >= 800) {
             ecu.send(&slcan::format(&frame));
         }
         k += 1;

@@ -4,12 +4,12 @@
 /// Bytes of a bank, of a page, and the pages that hold the key and the parameters: the last of the second bank.
 const BANK: u32 = 256 * 1024;
 const PAGE: u32 = 2 * 1024;
-const PARAMETER_PAGES: u32 = 5;
+const PARAMETER_PAGES: u32 = 7;
 
 /// BK_ECC (the second bank), SYSF_ECC (the system's own flash) and ADDR_ECC (bytes from the bank's start).
 pub type Place = (bool, bool, u32);
 
-/// Whether the word is one of the key or the parameters, whose reader has a CRC to tell by.
+/// Whether the word is one of the starts, the keys or the parameters, whose reader has a CRC to tell by.
 pub const fn is_in_parameters((is_second, is_system, address): Place) -> bool {
     is_second && !is_system && address < BANK && address >= BANK - PARAMETER_PAGES * PAGE
 }
@@ -18,15 +18,15 @@ pub const fn is_in_parameters((is_second, is_system, address): Place) -> bool {
 mod tests {
     use super::is_in_parameters;
 
-    /// 0x0807_D800 to 0x0807_FFFF, which `nucleo_g474re.x` leaves out of FLASH: 502 KiB from 0x0800_0000.
+    /// 0x0807_C800 to 0x0807_FFFF, which `nucleo_g474re.x` leaves out of FLASH: 498 KiB from 0x0800_0000.
     #[test]
     fn the_parameters_end_where_the_image_may_not_reach() {
         let map = include_str!("boards/nucleo_g474re.x");
-        assert!(map.contains("ORIGIN = 0x08000000, LENGTH = 502K"));
+        assert!(map.contains("ORIGIN = 0x08000000, LENGTH = 498K"));
         let offset = |address: u32| address - 0x0804_0000;
         for (address, expected) in [
-            (0x0807_D7F8, false),
-            (0x0807_D800, true),
+            (0x0807_C7F8, false),
+            (0x0807_C800, true),
             (0x0807_FFF8, true),
             (0x0808_0000, false),
         ] {

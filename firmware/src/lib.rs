@@ -8,7 +8,7 @@
 //! - [`image`]: whether the image in the flash is the one that was built.
 //! - [`eccr`]: where in the STM32G4's flash an error lies.
 //! - [`analogue`]: a motor stage and the column's sensors, in counts of converters.
-//! - [`storage`]: parameters in flash, [`nor`]: a model of a flash.
+//! - [`storage`]: parameters in flash, [`keys`]: keys and starts, [`nor`]: a model of a flash.
 //! - `host`: words from the machine that runs QEMU.
 //!
 //! Images (`src/bin`): `steering-ecu`, the product; `lockstep`, the same controller driven tick by tick by a
@@ -25,6 +25,7 @@ pub mod analogue;
 #[cfg(any(feature = "nucleo-g474re", not(target_os = "none")))]
 pub mod eccr;
 pub mod image;
+pub mod keys;
 #[cfg(any(not(target_os = "none"), feature = "semihosting"))]
 pub mod nor;
 #[cfg(any(target_os = "none", test))]

@@ -10,6 +10,8 @@
 //! over the bus is stored at the restart that it causes: the flash is never touched while the loop runs, since an erase
 //! takes longer than the watchdog waits. At every start a copy that cannot be read is written anew.
 //!
+//! What commands it has to be proven ([`haptic_secoc`]); without keys it never engages, unless it is an image for the bench.
+//!
 //! An image that is not as it was built begins in Fault ([`image`]); a chip with other options than the memory map's
 //! locks, and its flash is not touched.
 
@@ -24,11 +26,13 @@ use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::service::rejections::Rejections;
 use haptic_diag::trouble::Cells;
+use haptic_secoc::messages::State;
+use haptic_secoc::verifier::{Credentials, Verifier};
 
 use crate::boards::{Board, ThisBoard};
 use crate::service::{Origin, Restart, Service};
 use crate::storage::{self, Found};
-use crate::{analogue, image, reset, stack};
+use crate::{analogue, image, keys, reset, stack};
 
 /// Steps between two lines of the log: one second.
 const STEPS_PER_REPORT: u32 = 1000;
@@ -56,6 +60,7 @@ struct Counts {
 pub fn run(
     ecu: &'static mut Option<Ecu>,
     service: &'static mut Option<Service>,
+    verifier: &'static mut Option<Verifier>,
     mut disturb: impl FnMut(&mut Ecu, Boot, u32),
 ) -> ! {
     stack::paint();
@@ -79,6 +84,7 @@ pub fn run(
         key: is_sound.then(|| storage::key(board.flash())).flatten(),
     };
     let service = serve(service, found, params, origin, cells);
+    let verifier = authenticate(verifier, &mut board, is_sound);
     let mut counts = Counts::default();
     defmt::info!(
         "steering-ecu on {=str}, reset cause {=u8}, resets of late {=u8}, parameters {=u32}",
@@ -87,6 +93,13 @@ pub fn run(
         boot.recent_resets,
         found.stored.map_or(0, |stored| stored.sequence)
     );
+    match verifier.state() {
+        State::SipHash | State::AesCmac => defmt::info!("frames are authenticated"),
+        state => defmt::warn!(
+            "no frame is authenticated, state {=u8} (docs/reference/bus.md)",
+            state as u8
+        ),
+    }
     match image {
         image::State::Whole => {}
         image::State::Unsealed => defmt::warn!("nobody sealed this image (cargo xtask seal)"),
@@ -99,17 +112,23 @@ pub fn run(
     board.start_watchdog();
     loop {
         board.sleep();
-        receive(&mut board, ecu, service, &mut counts);
+        receive(&mut board, ecu, service, verifier, &mut counts);
         if board.tick() {
             disturb(ecu, boot, counts.steps);
-            step(&mut board, ecu, service, cells, &mut counts);
+            step(&mut board, ecu, service, verifier, cells, &mut counts);
         }
     }
 }
 
 /// Takes what has arrived, as much as may have within three ticks: a bus that never falls silent must not keep the step from
 /// its turn.
-fn receive(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
+fn receive(
+    board: &mut ThisBoard,
+    ecu: &mut Ecu,
+    service: &mut Service,
+    verifier: &mut Verifier,
+    counts: &mut Counts,
+) {
     for _ in 0..MOST_FRAMES {
         let frame = match board.can().receive() {
             Ok(frame) => frame,
@@ -125,10 +144,14 @@ fn receive(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: 
             continue;
         }
         let start = ThisBoard::cycles();
-        let received = ecu.receive(&frame, ThisBoard::now());
+        let passed = verifier.receive(&frame, ThisBoard::now());
+        let received = passed.map(|(frame, at)| ecu.receive(&frame, at));
         let cycles = ThisBoard::cycles().wrapping_sub(start);
         counts.receiving = counts.receiving.wrapping_add(cycles);
-        if let Err(reason) = received {
+        let Some((frame, _)) = passed else {
+            continue;
+        };
+        if let Some(Err(reason)) = received {
             counts.rejected.count(frame.id(), reason);
         }
         if let Some(set) = service.receive(&frame, ecu, counts.steps) {
@@ -171,6 +194,21 @@ fn serve(
     cells: &Cells,
 ) -> &'static mut Service {
     service.insert(Service::new(found, params, origin, cells))
+}
+
+/// Puts the verifier together, apart for the reason of [`begin`].
+#[inline(never)]
+fn authenticate(
+    verifier: &'static mut Option<Verifier>,
+    board: &mut ThisBoard,
+    is_sound: bool,
+) -> &'static mut Verifier {
+    let credentials = if is_sound {
+        keys::credentials(board.flash())
+    } else {
+        Credentials::None
+    };
+    verifier.insert(Verifier::new(credentials))
 }
 
 /// What the controller starts with; None locks it.
@@ -216,7 +254,14 @@ fn control(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) -> Step {
     step
 }
 
-fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, cells: &mut Cells, counts: &mut Counts) {
+fn step(
+    board: &mut ThisBoard,
+    ecu: &mut Ecu,
+    service: &mut Service,
+    verifier: &mut Verifier,
+    cells: &mut Cells,
+    counts: &mut Counts,
+) {
     let step = control(board, ecu, counts);
     // A frame that finds no room is lost; the next follows in a millisecond, and the receiver's time-out
     // judges a bus that stays closed.
@@ -227,7 +272,8 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, cells: &mut
     }
     // The torque is on its way; what follows may take its time.
     let report = service.frames(&step.command, &mut counts.rejected, counts.steps);
-    for frame in ecu.background_step().iter().chain(&report) {
+    let authentication = verifier.step(counts.steps);
+    for frame in ecu.background_step().iter().chain(&report).chain(&authentication) {
         if board.can().transmit(frame).is_err() {
             counts.unsent = counts.unsent.wrapping_add(1);
         }
@@ -243,10 +289,11 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, cells: &mut
     }
     if counts.steps.is_multiple_of(STEPS_PER_REPORT) {
         defmt::info!(
-            "steps {=u32}, received {=u32}, rejected {=u32}, bus errors {=u32}, unsent {=u32}, worst step {=u32} cycles, stack {=u32} of {=u32}",
+            "steps {=u32}, received {=u32}, rejected {=u32}, refused {=u32}, bus errors {=u32}, unsent {=u32}, worst step {=u32} cycles, stack {=u32} of {=u32}",
             counts.steps,
             counts.received,
             counts.rejected.total(),
+            verifier.total(),
             counts.bus_errors,
             counts.unsent,
             counts.worst_cycles,

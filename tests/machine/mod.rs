@@ -112,6 +112,7 @@ pub(crate) fn image(board: &str, bin: &str) -> PathBuf {
     let (bin, features) = match bin {
         "broken" => (bin, format!("{board},bench,broken")),
         "product" => ("steering-ecu", board.to_owned()),
+        "keys-siphash" | "keys-aes" => ("steering-ecu", format!("{board},{bin}")),
         _ => (bin, format!("{board},bench")),
     };
     let output = Command::new(cargo)

@@ -1,4 +1,4 @@
-//! Diagnosis as other tools meet it: their tester against an image in QEMU, and their reader of descriptions.
+//! Diagnosis and authentication as other tools meet them: their tester and their MACs against an image in QEMU, and their reader of descriptions.
 
 use anyhow::Result;
 
@@ -10,7 +10,7 @@ use crate::venv;
 pub(crate) fn check(built: Built) -> Result<()> {
     tool::ensure(&[("qemu-system-arm", "qemu-system-arm")])?;
     let (host_sim, python) = (built.host_sim()?, venv::environment()?);
-    for check in ["check_pdx.py", "check_diagnosis.py"] {
+    for check in ["check_pdx.py", "check_diagnosis.py", "check_authentication.py"] {
         run(command(&python.to_string_lossy())
             .arg(format!("tests/tools/{check}"))
             .arg(&host_sim))?;

@@ -5,7 +5,6 @@
 //! - [`data`]: the one list of what can be read, and under which identifier.
 //! - [`trouble`]: which faults there were, with a snapshot of each, in memory that a reset leaves alone.
 //! - [`security`]: the challenge that has to be answered before anything is written.
-//! - [`fresh`]: proof that a frame is its sender's and fresh; no message of the bus carries one yet.
 //! - [`server`]: sessions, services, and the routine that hands new parameters to `haptic_core::service::download`.
 //!
 //! Nothing here takes part in a step. [`server::Server::receive`] keeps a frame; the answer is worked out behind the torque,
@@ -28,7 +27,6 @@
 )]
 
 pub mod data;
-pub mod fresh;
 pub mod isotp;
 pub mod security;
 pub mod server;

@@ -17,6 +17,8 @@ mod target {
     use haptic_core::ecu::injection::Region;
     use haptic_firmware::service::Service;
     use haptic_firmware::{host, product};
+    use haptic_secoc::verifier::Verifier;
+    use haptic_secoc::verifier::Verifier;
 
     /// The step that breaks.
     const AT: u32 = 500;
@@ -25,6 +27,7 @@ mod target {
     fn main() -> ! {
         static mut ECU: Option<Ecu> = None;
         static mut SERVICE: Option<Service> = None;
+        static mut VERIFIER: Option<Verifier> = None;
         let mut buffer = [0; 128];
         let arguments = host::command_line(&mut buffer);
         let flaw = match arguments.split(' ').next_back() {
@@ -35,7 +38,7 @@ mod target {
             Some("veto") => Flaw::Veto,
             _ => Flaw::HangAlways,
         };
-        product::run(ECU, SERVICE, move |ecu, boot, step| {
+        product::run(ECU, SERVICE, VERIFIER, move |ecu, boot, step| {
             if step == AT && (boot.reset == ResetCause::PowerOn || flaw == Flaw::HangAlways) {
                 break_down(flaw, ecu);
             }

@@ -13,13 +13,15 @@ mod target {
     use haptic_core::ecu::Ecu;
     use haptic_firmware::product;
     use haptic_firmware::service::Service;
+    use haptic_secoc::verifier::Verifier;
 
     #[entry]
     fn main() -> ! {
         // A static and not on the stack, so that its size shows in the image's RAM.
         static mut ECU: Option<Ecu> = None;
         static mut SERVICE: Option<Service> = None;
-        product::run(ECU, SERVICE, |_, _, _| {})
+        static mut VERIFIER: Option<Verifier> = None;
+        product::run(ECU, SERVICE, VERIFIER, |_, _, _| {})
     }
 
     haptic_firmware::stop_on_panic_and_fault!();

@@ -48,7 +48,7 @@ pub trait Board: Sized {
     type Can: Can<Frame = Frame>;
     /// A light that is on while guidance acts.
     type Status: OutputPin;
-    /// The flash whose last five pages hold the key and the parameters ([`crate::storage`]).
+    /// The flash whose last seven pages hold starts and keys ([`crate::keys`]) and parameters ([`crate::storage`]).
     type Flash: NorFlash;
 
     /// The feature that chooses the board.

@@ -21,12 +21,14 @@ use embedded_hal::digital::{self, OutputPin};
 use embedded_hal_nb::nb;
 use embedded_hal_nb::serial::{self, Read, Write};
 use haptic_core::quantity::Instant;
+use haptic_secoc::Keys;
+use haptic_secoc::fresh::Algorithm;
 use volatile_register::{RO, RW};
 
 use super::{Board, WATCHDOG, start_systick};
 use crate::nor::{Nor, PAGE};
 use crate::slcan_can::SlcanCan;
-use crate::{reset, stack};
+use crate::{keys, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 25_000_000;
 /// Cycles between two looks for work, 2.5 us.
@@ -177,26 +179,46 @@ unsafe impl InterruptNumber for Irq {
 }
 
 /// The flash's memory.
-type Pages = [u8; 4 * PAGE];
+type Pages = [u8; 7 * PAGE];
 
 /// The flash's memory and, once it is delivered, a mark.
 #[unsafe(link_section = ".uninit.flash")]
 static mut FLASH: MaybeUninit<(u32, Pages)> = MaybeUninit::uninit();
 
+/// Which MAC the keys are for that the flash is delivered with.
+const DELIVERED: Option<Algorithm> = if cfg!(feature = "keys-aes") {
+    Some(Algorithm::AesCmac)
+} else if cfg!(feature = "keys-siphash") {
+    Some(Algorithm::SipHash)
+} else {
+    None
+};
+
+fn deliver(pages: &mut Pages, algorithm: Algorithm) {
+    let bytes = keys::bytes(&Keys::bench(algorithm));
+    let place = keys::place(&Nor::new(&mut *pages)).map_or(0, |place| place as usize);
+    if let Some(room) = pages.get_mut(place..place + bytes.len()) {
+        room.copy_from_slice(&bytes);
+    }
+}
+
 /// The flash's memory as the last start left it; blank at power-up, as delivered. To be called once.
 fn pages() -> &'static mut Pages {
-    const DELIVERED: u32 = 0xF1A5_0001;
+    const MARK: u32 = 0xF1A5_0001;
     // SAFETY: the only access, once; every pattern of bits is a value, and the first read is volatile, so that the
     // compiler does not reason about what it does not see being written.
     let (mark, pages) = unsafe {
         let flash = (&raw mut FLASH).cast::<(u32, Pages)>();
-        if (&raw const (*flash).0).read_volatile() != DELIVERED {
+        if (&raw const (*flash).0).read_volatile() != MARK {
             (&raw mut (*flash).1).write_bytes(0xFF, 1);
+            if let Some(algorithm) = DELIVERED {
+                deliver(&mut (*flash).1, algorithm);
+            }
         }
         let (mark, pages) = &mut *flash;
         (mark, pages)
     };
-    *mark = DELIVERED;
+    *mark = MARK;
     pages
 }
 

@@ -16,7 +16,7 @@
 //! watchdog. Compiled and linked in CI; it has never met the board.
 //!
 //! The flash is one of two banks, as the chip is delivered (option bit DBANK, which is looked at); the parameters are in
-//! the last five pages of the second. A word whose programming lost power reads as an error that no code of correction
+//! the last seven pages of the second. A word whose programming lost power reads as an error that no code of correction
 //! mends: the chip then raises the non-maskable interrupt. Among the parameters what was read fails its CRC, and that is
 //! all; anywhere else it is code or a constant, and the torque goes to zero and the processor is reset.
 //!

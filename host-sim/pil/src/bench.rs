@@ -6,7 +6,8 @@
 //! told, and the ECU's clock waits meanwhile.
 //!
 //! The ECU says what a product says: its parameters, which set and which processor it has, and what it did not use. It
-//! takes a set of parameters and starts anew with it, and keeps it until it ends. Not here: a product's flash and its
+//! takes a set of parameters and starts anew with it, and keeps it until it ends. Where frames are authenticated, that is done
+//! here, in front of the image, by what a product does it with. Not here: a product's flash and its
 //! watchdog, which the lock-step image has not (`cargo xtask qemu`).
 
 use std::collections::VecDeque;
@@ -19,6 +20,9 @@ use haptic_core::bus::slcan::{self, Line, Parser};
 use haptic_core::controller::params::Params;
 use haptic_core::quantity;
 use haptic_lockstep::{Start, StartState, is_of_a_lock_step_run};
+use haptic_secoc::Keys;
+pub use haptic_secoc::fresh::Algorithm;
+use haptic_secoc::verifier::{Credentials, Verifier};
 
 use super::PilError;
 use super::stepped::Stepped;
@@ -38,6 +42,7 @@ pub struct Bench {
     listener: TcpListener,
     clients: Vec<Client>,
     time_us: u32,
+    verifier: Option<Verifier>,
 }
 
 /// Somebody on the bus.
@@ -52,11 +57,12 @@ struct Client {
 }
 
 impl Bench {
-    /// Builds the image, starts it and listens: `127.0.0.1:3333`, port 0 for any.
+    /// Builds the image, starts it and listens: `127.0.0.1:3333`, port 0 for any. Frames that command the ECU need a proof where a
+    /// MAC is named, by the keys that everybody knows.
     ///
     /// # Errors
     /// What is missing, or why nobody can listen there.
-    pub fn start(address: &str) -> Result<Self, PilError> {
+    pub fn start(address: &str, authenticate: Option<Algorithm>) -> Result<Self, PilError> {
         let cannot = |e: std::io::Error| PilError::Failed(format!("cannot listen on {address}: {e}"));
         // A wrong address is told before the image is built, and nobody waits at the door while it is.
         drop(TcpListener::bind(address).map_err(cannot)?);
@@ -73,6 +79,9 @@ impl Bench {
             listener,
             clients: Vec::new(),
             time_us: 0,
+            // Its first start, since it begins with a blank flash.
+            verifier: authenticate
+                .map(|algorithm| Verifier::new(Credentials::Keys(Keys::bench(algorithm), Some(0)))),
         })
     }
 
@@ -97,12 +106,19 @@ impl Bench {
         let heard = self.on_the_bus();
         // A client must not end the ECU's millisecond.
         let for_the_ecu = heard.iter().map(|(_, frame)| *frame);
+        let now = quantity::Instant::from_us(self.time_us);
         let frames: Vec<Frame> = for_the_ecu
             .filter(|frame| !is_of_a_lock_step_run(frame))
+            .filter_map(|frame| match &mut self.verifier {
+                Some(verifier) => verifier.receive(&frame, now).map(|(frame, _)| frame),
+                None => Some(frame),
+            })
             .collect();
-        self.ecu.tick(quantity::Instant::from_us(self.time_us), &frames)?;
+        self.ecu.tick(now, &frames)?;
+        let mut answer = self.ecu.answer()?;
+        let verifier = self.verifier.as_mut();
+        answer.extend(verifier.and_then(|verifier| verifier.step(self.time_us / 1000)));
         self.time_us = self.time_us.wrapping_add(1000);
-        let answer = self.ecu.answer()?;
         for (index, client) in self.clients.iter_mut().enumerate() {
             let others = heard.iter().filter(|(from, _)| *from != index);
             others.for_each(|(_, frame)| client.send(frame));

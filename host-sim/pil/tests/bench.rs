@@ -64,7 +64,7 @@ fn guidance(frames: &[Frame]) -> Vec<Guidance> {
 
 #[test]
 fn clients_and_the_ecu_hear_each_other_and_nobody_himself() {
-    let mut bench = Bench::start("127.0.0.1:0").unwrap();
+    let mut bench = Bench::start("127.0.0.1:0", None).unwrap();
     let (mut one, mut other) = (Client::join(&bench), Client::join(&bench));
     // What a socket has taken is there for its other end a moment later.
     let (mut by_one, mut by_other) = (0, 0);
@@ -165,7 +165,7 @@ fn near(values: &[ParameterValue], params: &Params) -> bool {
 
 #[test]
 fn the_ecu_says_what_it_did_not_use_and_which_parameters_it_has() {
-    let mut bench = Bench::start("127.0.0.1:0").unwrap();
+    let mut bench = Bench::start("127.0.0.1:0", None).unwrap();
     let mut client = Client::join(&bench);
     let mut counter = 0;
     let mut heard = client.drive(&mut bench, 500, Speed::from_m_per_s(0.0), &mut counter);
@@ -204,7 +204,7 @@ fn the_ecu_says_what_it_did_not_use_and_which_parameters_it_has() {
 
 #[test]
 fn parameters_can_be_tried() {
-    let mut bench = Bench::start("127.0.0.1:0").unwrap();
+    let mut bench = Bench::start("127.0.0.1:0", None).unwrap();
     let mut client = Client::join(&bench);
     let (mut counter, still) = (0, Speed::from_m_per_s(0.0));
     let params = Params {
@@ -312,7 +312,7 @@ impl Tester {
 /// C1111, that somebody sends under the ECU's own identifier, which is the fault that this test makes.
 #[test]
 fn a_tester_finds_a_fault_after_a_reset_and_has_a_parameter_stored() {
-    let mut bench = Bench::start("127.0.0.1:0").unwrap();
+    let mut bench = Bench::start("127.0.0.1:0", None).unwrap();
     let mut tester = Tester {
         client: Client::join(&bench),
         link: Link::NEW,
@@ -369,7 +369,7 @@ fn an_address_that_is_taken_or_none_is_told() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let taken = taken.local_addr().unwrap().to_string();
     for address in [taken.as_str(), "nowhere"] {
-        match Bench::start(address) {
+        match Bench::start(address, None) {
             Err(PilError::Failed(why)) => assert!(why.contains(address), "{why}"),
             _ => panic!("{address}: nobody can listen there"),
         }

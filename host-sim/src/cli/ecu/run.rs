@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::Args;
-use haptic_pil::bench::Bench;
+use clap::{Args, ValueEnum};
+use haptic_pil::bench::{Algorithm, Bench};
 
 use super::super::{BadInput, Outcome, print};
 
@@ -13,9 +13,28 @@ pub(in crate::cli) struct Arguments {
     /// Where clients join the bus, by SLCAN: HOST:PORT; port 0 for any that is free
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:3333")]
     listen: String,
+    /// Use only frames that are proven, by this MAC and the keys of the bench (docs/reference/bus.md, Authentication)
+    #[arg(long, value_name = "MAC")]
+    authenticate: Option<Mac>,
     /// End after so many seconds, 1 to 1e9; otherwise Ctrl-C ends it
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     r#for: Option<u64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Mac {
+    #[value(name = "siphash")]
+    SipHash,
+    AesCmac,
+}
+
+impl From<Mac> for Algorithm {
+    fn from(mac: Mac) -> Self {
+        match mac {
+            Mac::SipHash => Self::SipHash,
+            Mac::AesCmac => Self::AesCmac,
+        }
+    }
 }
 
 /// Set by Ctrl-C, which is the usual end of it, and by a request to terminate: QEMU must not outlive this program.
@@ -23,7 +42,7 @@ static ENDED: AtomicBool = AtomicBool::new(false);
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     ctrlc::set_handler(|| ENDED.store(true, Ordering::Relaxed))?;
-    let mut bench = Bench::start(&arguments.listen)?;
+    let mut bench = Bench::start(&arguments.listen, arguments.authenticate.map(Algorithm::from))?;
     print(&format!(
         "the ECU is on the bus at {}; Ctrl-C ends it",
         bench.address()?

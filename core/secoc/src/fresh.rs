@@ -1,6 +1,6 @@
-//! Proof that a frame is its sender's and fresh, in the manner of AUTOSAR SecOC: a MAC over identifier, payload and a freshness
-//! value, cut to the bits that the frame has; of the freshness value it carries the lowest bits. A tag of 24 bits lets one false frame of
-//! 16.7 million pass for each epoch that it is tried with, which are two.
+//! A proof and its freshness: a MAC over identifier, payload and a freshness value, cut to the bits that a frame has for it; of the
+//! freshness value it carries the lowest bits. A tag of 24 bits lets one false frame of 16.7 million pass for each epoch that it is
+//! tried with, which are two.
 //!
 //! The freshness value is an *epoch* and a count. The receiver gives out epochs, and none twice: a sender without one [`Sender::ask`]s with
 //! a number of its own, and the receiver's [`Offer`] is a MAC over that number too, so that no old offer is taken. The receiver goes
@@ -8,14 +8,17 @@
 //! changes nothing. Neither side has to remember anything across a reset but the receiver, which begins each start with an epoch
 //! that it never had.
 //!
-//! Not here: bits of frames, and where the receiver keeps the number of its starts. No message of the bus carries a proof yet.
+//! Not here: bits of frames (`messages`), and where the receiver keeps the number of its starts.
 
 use core::hash::Hasher;
 
+use aes::Aes128;
+use cmac::Mac as _;
 use heapless::Vec;
 use siphasher::sip::SipHasher24;
 
-use crate::security::{self, Key};
+/// A key of either MAC.
+pub type Key = [u8; 16];
 
 /// The longest payload.
 pub const LONGEST: usize = 64;
@@ -30,13 +33,23 @@ pub trait Mac {
     fn tag(&self, text: &[u8]) -> u32;
 }
 
-/// AES-CMAC (RFC 4493).
-#[derive(Debug, Clone)]
-pub struct Cmac(pub Key);
+/// AES-CMAC (RFC 4493), its round keys worked out once.
+#[derive(Clone)]
+pub struct Cmac(cmac::Cmac<Aes128>);
+
+impl Cmac {
+    /// The MAC under a key.
+    #[must_use]
+    pub fn new(key: &Key) -> Self {
+        Self(cmac::Mac::new(key.into()))
+    }
+}
 
 impl Mac for Cmac {
     fn tag(&self, text: &[u8]) -> u32 {
-        let [a, b, c, d, ..] = security::mac(&self.0, text);
+        let mut mac = self.0.clone();
+        mac.update(text);
+        let [a, b, c, d, ..] = <[u8; 16]>::from(mac.finalize().into_bytes());
         u32::from_be_bytes([a, b, c, d])
     }
 }
@@ -54,6 +67,48 @@ impl Mac for SipHash {
     }
 }
 
+/// Which MAC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Algorithm {
+    /// SipHash-2-4.
+    SipHash,
+    /// AES-CMAC.
+    AesCmac,
+}
+
+/// A MAC that is chosen when the program starts.
+#[derive(Clone)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "no allocation; an ECU has one for each of its two senders"
+)]
+pub enum Chosen {
+    /// SipHash-2-4.
+    SipHash(SipHash),
+    /// AES-CMAC.
+    AesCmac(Cmac),
+}
+
+impl Chosen {
+    /// The MAC under a key.
+    #[must_use]
+    pub fn new(algorithm: Algorithm, key: &Key) -> Self {
+        match algorithm {
+            Algorithm::SipHash => Self::SipHash(SipHash(*key)),
+            Algorithm::AesCmac => Self::AesCmac(Cmac::new(key)),
+        }
+    }
+}
+
+impl Mac for Chosen {
+    fn tag(&self, text: &[u8]) -> u32 {
+        match self {
+            Self::SipHash(mac) => mac.tag(text),
+            Self::AesCmac(mac) => mac.tag(text),
+        }
+    }
+}
+
 /// What a frame carries beside its payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Proof {
@@ -68,7 +123,7 @@ pub struct Proof {
 pub struct Offer {
     /// The epoch to count in.
     pub epoch: u32,
-    /// The first 32 bits of its MAC.
+    /// The highest bits of its MAC, as many as a proof has.
     pub tag: u32,
 }
 
@@ -101,7 +156,7 @@ const fn low(count: u32, bits: u32) -> u8 {
 }
 
 /// The sender of one identifier, whose frames carry the lowest `BITS` bits of the count, 2 to 8, and `TAG` bits of the MAC, 24 to 32.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Sender<M, const BITS: u32, const TAG: u32> {
     mac: M,
     id: u16,
@@ -141,7 +196,7 @@ impl<M: Mac, const BITS: u32, const TAG: u32> Sender<M, BITS, TAG> {
             return;
         };
         let is_true = text(Purpose::Offer, self.id, offer.epoch, question, &[])
-            .is_some_and(|text| self.mac.tag(&text) == offer.tag);
+            .is_some_and(|text| cut(self.mac.tag(&text), TAG) == offer.tag);
         if is_true && self.epoch != Some(offer.epoch) {
             (self.epoch, self.count) = (Some(offer.epoch), 0);
         }
@@ -163,9 +218,9 @@ impl<M: Mac, const BITS: u32, const TAG: u32> Sender<M, BITS, TAG> {
 }
 
 /// The receiver of one identifier.
+/// It is lent its MAC, which several share.
 #[derive(Debug, Clone)]
-pub struct Receiver<M, const BITS: u32, const TAG: u32> {
-    mac: M,
+pub struct Receiver<const BITS: u32, const TAG: u32> {
     id: u16,
     /// The epoch in use and its last count.
     used: Option<(u32, u32)>,
@@ -175,12 +230,11 @@ pub struct Receiver<M, const BITS: u32, const TAG: u32> {
     left: u32,
 }
 
-impl<M: Mac, const BITS: u32, const TAG: u32> Receiver<M, BITS, TAG> {
+impl<const BITS: u32, const TAG: u32> Receiver<BITS, TAG> {
     /// A receiver at the start of that number, which no start had before.
     #[must_use]
-    pub const fn new(mac: M, id: u16, start: u32) -> Self {
+    pub const fn new(id: u16, start: u32) -> Self {
         Self {
-            mac,
             id,
             used: None,
             offered: start.wrapping_mul(EPOCHS),
@@ -196,19 +250,19 @@ impl<M: Mac, const BITS: u32, const TAG: u32> Receiver<M, BITS, TAG> {
 
     /// Answers a sender's question; None when the start's epochs are used up.
     #[must_use]
-    pub fn offer(&self, question: u32) -> Option<Offer> {
+    pub fn offer(&self, mac: &impl Mac, question: u32) -> Option<Offer> {
         let text = text(Purpose::Offer, self.id, self.offered, question, &[]).filter(|_| self.left > 0)?;
         Some(Offer {
             epoch: self.offered,
-            tag: self.mac.tag(&text),
+            tag: cut(mac.tag(&text), TAG),
         })
     }
 
     /// Whether a frame is the sender's, and fresh: newer than every one before. At most 2^`BITS` - 2 frames may be lost between two;
     /// a sender that is refused after more of them asks anew.
-    pub fn accept(&mut self, payload: &[u8], proof: &Proof) -> bool {
+    pub fn accept(&mut self, mac: &impl Mac, payload: &[u8], proof: &Proof) -> bool {
         if let Some((epoch, last)) = self.used
-            && let Some(count) = self.next(epoch, last, payload, proof)
+            && let Some(count) = self.next(mac, epoch, last, payload, proof)
         {
             self.used = Some((epoch, count));
             return true;
@@ -216,7 +270,7 @@ impl<M: Mac, const BITS: u32, const TAG: u32> Receiver<M, BITS, TAG> {
         if self.left == 0 {
             return false;
         }
-        let Some(count) = self.next(self.offered, 0, payload, proof) else {
+        let Some(count) = self.next(mac, self.offered, 0, payload, proof) else {
             return false;
         };
         self.used = Some((self.offered, count));
@@ -225,12 +279,12 @@ impl<M: Mac, const BITS: u32, const TAG: u32> Receiver<M, BITS, TAG> {
     }
 
     /// The count of a frame of an epoch, behind the last one.
-    fn next(&self, epoch: u32, last: u32, payload: &[u8], proof: &Proof) -> Option<u32> {
+    fn next(&self, mac: &impl Mac, epoch: u32, last: u32, payload: &[u8], proof: &Proof) -> Option<u32> {
         let ahead = low(u32::from(proof.count).wrapping_sub(last), BITS);
         // The last one again, or so many were lost that it cannot be told.
         let count = last.checked_add(u32::from(ahead)).filter(|_| ahead > 0)?;
         let text = text(Purpose::Frame, self.id, epoch, count, payload)?;
         let is_whole = low(count, BITS) == proof.count;
-        (is_whole && cut(self.mac.tag(&text), TAG) == proof.tag).then_some(count)
+        (is_whole && cut(mac.tag(&text), TAG) == proof.tag).then_some(count)
     }
 }

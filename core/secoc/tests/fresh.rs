@@ -1,10 +1,10 @@
 use std::collections::HashSet;
 
-use haptic_diag::fresh::{Cmac, Mac, Offer, Proof, Receiver, Sender, SipHash};
+use haptic_secoc::fresh::{Cmac, Mac, Offer, Proof, Receiver, Sender, SipHash};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
-use crate::rig::KEY;
+use crate::KEY;
 
 const ID: u16 = 0x130;
 
@@ -15,7 +15,7 @@ fn both_macs_are_those_of_their_papers() {
     let message = [
         0x6B, 0xC1, 0xBE, 0xE2, 0x2E, 0x40, 0x9F, 0x96, 0xE9, 0x3D, 0x7E, 0x11, 0x73, 0x93, 0x17, 0x2A,
     ];
-    assert_eq!(Cmac(KEY).tag(&message), 0x070A_16B4);
+    assert_eq!(Cmac::new(&KEY).tag(&message), 0x070A_16B4);
     let counting: [u8; 16] = std::array::from_fn(|k| k as u8);
     assert_eq!(SipHash(counting).tag(&[]), 0x310E_0EDD);
     // 0xa129ca6149be45e5, little-endian.
@@ -26,7 +26,7 @@ fn both_macs_are_those_of_their_papers() {
 struct Bus<M, const TAG: u32> {
     mac: M,
     sender: Sender<M, 8, TAG>,
-    receiver: Receiver<M, 8, TAG>,
+    receiver: Receiver<8, TAG>,
     starts: u32,
     random: SmallRng,
     /// Payloads count up, so that each was sent once.
@@ -43,7 +43,7 @@ impl<M: Mac + Clone, const TAG: u32> Bus<M, TAG> {
     fn new(mac: M, seed: u64) -> Self {
         Self {
             sender: Sender::new(mac.clone(), ID),
-            receiver: Receiver::new(mac.clone(), ID, 1),
+            receiver: Receiver::new(ID, 1),
             starts: 1,
             mac,
             random: SmallRng::seed_from_u64(seed),
@@ -58,7 +58,7 @@ impl<M: Mac + Clone, const TAG: u32> Bus<M, TAG> {
 
     /// A frame comes: whether it is taken.
     fn come(&mut self, payload: u64, proof: &Proof) -> bool {
-        let is_taken = self.receiver.accept(&payload.to_le_bytes(), proof);
+        let is_taken = self.receiver.accept(&self.mac, &payload.to_le_bytes(), proof);
         if is_taken {
             let is_true = payload <= self.sent && self.taken.insert(payload);
             self.false_ones += u64::from(!is_true);
@@ -76,7 +76,7 @@ impl<M: Mac + Clone, const TAG: u32> Bus<M, TAG> {
     fn synchronise(&mut self) {
         let question = self.sender.ask(self.random.random());
         self.questions.push(question);
-        let offer = self.receiver.offer(question).unwrap();
+        let offer = self.receiver.offer(&self.mac, question).unwrap();
         self.offers.push(offer);
         self.sender.take(&offer);
     }
@@ -103,7 +103,7 @@ impl<M: Mac + Clone, const TAG: u32> Bus<M, TAG> {
             .get(self.random.random_range(0..=self.questions.len()))
         {
             // What he hears then is kept for later.
-            self.offers.extend(self.receiver.offer(*question));
+            self.offers.extend(self.receiver.offer(&self.mac, *question));
         }
         if let Some(offer) = self.offers.get(self.random.random_range(0..=self.offers.len())) {
             self.sender.take(&offer.clone());
@@ -134,7 +134,7 @@ fn drive<M: Mac + Clone, const TAG: u32>(mac: M, frames: u64) -> u64 {
             }
             1 => {
                 bus.starts += 1;
-                bus.receiver = Receiver::new(bus.mac.clone(), ID, bus.starts);
+                bus.receiver = Receiver::new(ID, bus.starts);
                 assert!(bus.receiver.is_unsynchronised());
                 let (payload, proof) = bus.send().unwrap();
                 assert!(!bus.come(payload, &proof), "of an old epoch");
@@ -187,52 +187,59 @@ fn a_short_tag_lets_as_many_pass_as_chance_does() {
 
 #[test]
 fn aes_does_it_too() {
-    assert_eq!(drive::<_, 32>(Cmac(KEY), 20_000), 0);
+    assert_eq!(drive::<_, 32>(Cmac::new(&KEY), 20_000), 0);
 }
 
 #[test]
 fn a_proof_is_of_its_identifier_payload_count_and_key() {
+    let mac = Cmac::new(&KEY);
     let pair = || {
-        let mut sender = Sender::<_, 4, 24>::new(Cmac(KEY), ID);
-        let receiver = Receiver::<_, 4, 24>::new(Cmac(KEY), ID, 7);
+        let mut sender = Sender::<_, 4, 24>::new(Cmac::new(&KEY), ID);
+        let receiver = Receiver::<4, 24>::new(ID, 7);
         let question = sender.ask(3);
-        sender.take(&receiver.offer(question).unwrap());
+        sender.take(&receiver.offer(&mac, question).unwrap());
         (sender, receiver)
     };
     let (mut sender, mut receiver) = pair();
     let proof = sender.prove(b"payload").unwrap();
-    let mut other = Receiver::<_, 4, 24>::new(Cmac(KEY), ID + 1, 7);
-    assert!(!other.accept(b"payload", &proof), "another identifier");
-    let mut other = Receiver::<_, 4, 24>::new(Cmac([0; 16]), ID, 7);
-    assert!(!other.accept(b"payload", &proof), "another key");
-    assert!(!receiver.accept(b"Payload", &proof) && !receiver.accept(b"payloa", &proof));
+    let mut other = Receiver::<4, 24>::new(ID + 1, 7);
+    assert!(!other.accept(&mac, b"payload", &proof), "another identifier");
+    let mut other = Receiver::<4, 24>::new(ID, 7);
+    assert!(
+        !other.accept(&Cmac::new(&[0; 16]), b"payload", &proof),
+        "another key"
+    );
+    assert!(!receiver.accept(&mac, b"Payload", &proof) && !receiver.accept(&mac, b"payloa", &proof));
     for bit in 0..24 {
         let tag = proof.tag ^ 1 << bit;
-        assert!(!receiver.accept(b"payload", &Proof { tag, ..proof }), "bit {bit}");
+        assert!(
+            !receiver.accept(&mac, b"payload", &Proof { tag, ..proof }),
+            "bit {bit}"
+        );
     }
     for count in (0..=255).filter(|count| *count != proof.count) {
         assert!(
-            !receiver.accept(b"payload", &Proof { count, ..proof }),
+            !receiver.accept(&mac, b"payload", &Proof { count, ..proof }),
             "count {count}"
         );
     }
-    assert!(receiver.accept(b"payload", &proof) && !receiver.accept(b"payload", &proof));
+    assert!(receiver.accept(&mac, b"payload", &proof) && !receiver.accept(&mac, b"payload", &proof));
     // Fourteen may be lost of four bits; fifteen are one too many.
     for (lost, is_taken) in [(14, true), (15, false)] {
         let (mut sender, mut receiver) = pair();
-        assert!(receiver.accept(b"", &sender.prove(b"").unwrap()));
+        assert!(receiver.accept(&mac, b"", &sender.prove(b"").unwrap()));
         for _ in 0..lost {
             assert!(sender.prove(b"").is_some());
         }
         assert_eq!(
-            receiver.accept(b"", &sender.prove(b"").unwrap()),
+            receiver.accept(&mac, b"", &sender.prove(b"").unwrap()),
             is_taken,
             "{lost} lost"
         );
     }
     assert_eq!(sender.prove(&[0; 65]), None, "too long");
     assert_eq!(
-        Sender::<_, 4, 24>::new(Cmac(KEY), ID).prove(b""),
+        Sender::<_, 4, 24>::new(Cmac::new(&KEY), ID).prove(b""),
         None,
         "no epoch"
     );
@@ -241,18 +248,19 @@ fn a_proof_is_of_its_identifier_payload_count_and_key() {
 /// An offer answers the last question of its sender, once.
 #[test]
 fn an_old_offer_is_none() {
+    let mac = Cmac::new(&KEY);
     let (mut sender, receiver) = (
-        Sender::<_, 8, 24>::new(Cmac(KEY), ID),
-        Receiver::<_, 8, 24>::new(Cmac(KEY), ID, 1),
+        Sender::<_, 8, 24>::new(Cmac::new(&KEY), ID),
+        Receiver::<8, 24>::new(ID, 1),
     );
     let question = sender.ask(1);
-    let old = receiver.offer(question).unwrap();
+    let old = receiver.offer(&mac, question).unwrap();
     sender.ask(2);
     sender.take(&old);
     assert_eq!(sender.prove(b""), None);
-    sender.take(&receiver.offer(2).unwrap());
+    sender.take(&receiver.offer(&mac, 2).unwrap());
     let first = sender.prove(b"").unwrap();
     // Taken again it would count from the beginning.
-    sender.take(&receiver.offer(2).unwrap());
+    sender.take(&receiver.offer(&mac, 2).unwrap());
     assert_ne!(sender.prove(b"").unwrap(), first);
 }

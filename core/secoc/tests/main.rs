@@ -1,0 +1,12 @@
+//! Authentication, judged by published vectors, by a bus with an eavesdropper, and by the DBC file.
+
+mod attacks;
+mod dbc;
+mod frames;
+mod fresh;
+mod verifier;
+
+/// RFC 4493, section 4.
+const KEY: [u8; 16] = [
+    0x2B, 0x7E, 0x15, 0x16, 0x28, 0xAE, 0xD2, 0xA6, 0xAB, 0xF7, 0x15, 0x88, 0x09, 0xCF, 0x4F, 0x3C,
+];

@@ -1,0 +1,395 @@
+//! Both sides on a bus that loses, swaps and repeats frames, and resets of either.
+
+use std::collections::HashSet;
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::e2e::ReceiverState;
+use haptic_core::bus::messages::{Column, LanePreview, Message, ParameterUnlock, Request, Vehicle};
+use haptic_core::quantity::{Instant, Micros, Ratio};
+use haptic_secoc::Keys;
+use haptic_secoc::fresh::Algorithm;
+use haptic_secoc::messages::{PROVEN, Place, Refusal, STATUS_ID, State, Status};
+use haptic_secoc::prover::Prover;
+use haptic_secoc::verifier::{Credentials, Verifier};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+const OFFER: u16 = 0x358;
+
+fn keyed(algorithm: Algorithm, start: u32) -> Verifier {
+    Verifier::new(Credentials::Keys(Keys::bench(algorithm), Some(start)))
+}
+
+/// A number as the payload that is authenticated of a message, so that each frame is sent once.
+fn numbered(id: u16, number: u32) -> Frame {
+    let mut data = [0; 8];
+    data[1..4].copy_from_slice(&number.to_le_bytes()[..3]);
+    Frame::full(id, data)
+}
+
+fn number(frame: &Frame) -> (u16, u32) {
+    let [_, a, b, c, ..] = frame.full_data().unwrap();
+    (frame.id(), u32::from_le_bytes([a, b, c, 0]))
+}
+
+/// The ECU, both senders in one, and all that was ever on the bus.
+struct Bus {
+    verifier: Verifier,
+    prover: Prover,
+    random: SmallRng,
+    ms: u32,
+    starts: u32,
+    heard: Vec<Frame>,
+    taken: HashSet<(u16, u32)>,
+    sent: u32,
+    false_ones: u32,
+}
+
+impl Bus {
+    fn new(algorithm: Algorithm) -> Self {
+        Self {
+            verifier: keyed(algorithm, 1),
+            prover: Prover::new(&Keys::bench(algorithm)),
+            random: SmallRng::seed_from_u64(7),
+            ms: 0,
+            starts: 1,
+            heard: Vec::new(),
+            taken: HashSet::new(),
+            sent: 0,
+            false_ones: 0,
+        }
+    }
+
+    fn come(&mut self, frame: &Frame) -> bool {
+        let now = Instant::from_us(self.ms.wrapping_mul(1000));
+        let Some((passed, _)) = self.verifier.receive(frame, now) else {
+            return false;
+        };
+        let key = number(&passed);
+        self.false_ones += u32::from(key.1 > self.sent || !self.taken.insert(key));
+        true
+    }
+
+    /// A step of the ECU, and what its senders make of what it says.
+    fn step(&mut self) {
+        self.ms += 1;
+        if let Some(frame) = self.verifier.step(self.ms) {
+            let random = &mut self.random;
+            for question in self.prover.hear(&frame, || random.random()) {
+                self.come(&question);
+                self.heard.push(question);
+            }
+        }
+    }
+
+    fn send(&mut self, id: u16) -> Vec<Frame> {
+        self.sent += 1;
+        let frames = self.prover.prove(&numbered(id, self.sent)).to_vec();
+        self.heard.extend(&frames);
+        frames
+    }
+
+    /// Steps until a message passes; how many.
+    fn resume(&mut self, id: u16) -> u32 {
+        for steps in 1..1000 {
+            self.step();
+            let frames = self.send(id);
+            if frames
+                .iter()
+                .fold(false, |passed, frame| passed | self.come(frame))
+            {
+                return steps;
+            }
+        }
+        panic!("nothing passes");
+    }
+}
+
+/// One of ten frames is lost, one of a hundred comes after the next, an eavesdropper repeats two old ones for each, in pairs or apart,
+/// and every thousandth time one side starts anew. `frames` counts the true ones, proofs included.
+fn drive(algorithm: Algorithm, frames: usize) {
+    let mut bus = Bus::new(algorithm);
+    let ids = [LanePreview::ID, Vehicle::ID, Request::ID];
+    let (mut count, mut resets, mut longest, mut lost) = (0, 0, 0, 0);
+    let mut late: Vec<Frame> = Vec::new();
+    for id in ids {
+        bus.resume(id);
+    }
+    while count < frames {
+        let id = ids[bus.sent as usize % 3];
+        match bus.random.random_range(0..2000) {
+            0 => bus.prover = Prover::new(&Keys::bench(algorithm)),
+            1 => {
+                bus.starts += 1;
+                bus.verifier = keyed(algorithm, bus.starts);
+            }
+            _ => {
+                let sent = bus.send(id);
+                count += sent.len();
+                let waiting = std::mem::take(&mut late);
+                for frame in sent {
+                    match bus.random.random_range(0..100) {
+                        0..10 => lost += 1,
+                        10 => late.push(frame),
+                        _ => drop(bus.come(&frame)),
+                    }
+                }
+                for frame in waiting {
+                    bus.come(&frame);
+                }
+                let last = bus.heard.len() - 1;
+                let recent = bus.random.random_range(last.saturating_sub(60)..last);
+                let old = bus.random.random_range(0..last);
+                for at in [recent, recent + 1, old, old + 1] {
+                    bus.come(&bus.heard[at].clone());
+                }
+                bus.step();
+                continue;
+            }
+        }
+        resets += 1;
+        for id in ids {
+            longest = longest.max(bus.resume(id));
+        }
+    }
+    assert_eq!(bus.false_ones, 0, "taken twice, or nobody's");
+    let taken = bus.taken.len();
+    println!(
+        "{count} frames, {taken} messages taken, {lost} frames lost, {resets} resets, back after {longest} ms at most"
+    );
+    assert!(
+        resets > frames / 4000 && lost > frames / 20,
+        "{resets} resets, {lost} lost"
+    );
+    // A proof lost, and its frame is; then an eavesdropper's frame takes the place of a true one that waits for its proof.
+    assert!(taken > frames / 3, "{taken} of {frames}");
+    // A status says that the ECU waits, and the offers of the messages follow, 50 ms apart.
+    assert!(longest <= 350, "{longest} ms");
+}
+
+#[test]
+fn of_a_million_frames_none_is_taken_twice() {
+    drive(Algorithm::SipHash, 1_000_000);
+}
+
+#[test]
+fn aes_does_it_too() {
+    drive(Algorithm::AesCmac, 20_000);
+}
+
+/// The counts of every message and reason, from statuses alone.
+fn refused(verifier: &mut Verifier) -> Vec<(u16, Refusal, u16)> {
+    let statuses = (0..40).map(|turn| verifier.step(turn * 100 + 60).unwrap());
+    let mut lines: Vec<_> = statuses
+        .filter_map(|frame| Status::decode(&frame).unwrap().refused)
+        .map(|line| (line.id, line.reason, line.count))
+        .collect();
+    lines.sort_by_key(|(id, reason, _)| (*id, *reason as u8));
+    lines.dedup();
+    lines
+}
+
+/// A verifier and a prover that have an epoch for everything.
+fn pair() -> (Verifier, Prover) {
+    let (mut verifier, mut prover) = (
+        keyed(Algorithm::AesCmac, 9),
+        Prover::new(&Keys::bench(Algorithm::AesCmac)),
+    );
+    for proven in PROVEN {
+        prover.prove(&numbered(proven.info.id, 0));
+    }
+    let mut random = 0;
+    for step in 0..400 {
+        if let Some(frame) = verifier.step(step) {
+            for question in prover.hear(&frame, || {
+                random += 1;
+                random
+            }) {
+                assert_eq!(verifier.receive(&question, Instant::from_us(0)), None);
+            }
+        }
+        verifier.step(0);
+    }
+    (verifier, prover)
+}
+
+#[test]
+fn a_frame_passes_as_the_bus_has_it_and_counts_as_heard_when_it_came() {
+    let (mut verifier, mut prover) = pair();
+    let vehicle = Vehicle::default().encode(3);
+    let [frame, proof] = prover.prove(&vehicle)[..] else {
+        panic!("two frames")
+    };
+    assert_eq!((frame, proof.id(), proof.data().len()), (vehicle, 0x121, 4));
+    let came = Instant::from_us(70);
+    assert_eq!(verifier.receive(&frame, came), None);
+    let passed = verifier.receive(&proof, came.after(Micros::from_us(5000)));
+    assert_eq!(passed, Some((vehicle, came)));
+    // A microsecond later it is too late.
+    let [frame, proof] = prover.prove(&vehicle)[..] else {
+        panic!("two frames")
+    };
+    assert_eq!(verifier.receive(&frame, came), None);
+    assert_eq!(verifier.receive(&proof, came.after(Micros::from_us(5001))), None);
+    // A request has its proof within, its CRC fits, and its signals are what they were.
+    let request = Request {
+        engage: true,
+        probe: true,
+        authority: Ratio::ONE,
+    };
+    let [frame] = prover.prove(&request.encode(5))[..] else {
+        panic!("one frame")
+    };
+    assert_eq!(verifier.receive(&frame, came), Some((frame, came)));
+    assert_eq!(
+        Request::decode(&mut { ReceiverState::TRUSTED }, &frame),
+        Ok(request)
+    );
+    assert_eq!(verifier.receive(&frame, came), None, "twice");
+    // What is not in the list is none of its business.
+    let column = Column::default().encode(0);
+    assert_eq!(verifier.receive(&column, came), Some((column, came)));
+    assert_eq!(prover.prove(&column)[..], [column]);
+    assert_eq!(
+        refused(&mut verifier),
+        [(0x120, Refusal::NoFrame, 1), (0x130, Refusal::Proof, 1)]
+    );
+}
+
+/// Frames that pass every check of core, without a proof, with that of another frame, and cut.
+#[test]
+fn what_is_not_proven_is_refused_and_counted() {
+    let (mut verifier, mut prover) = pair();
+    let now = Instant::from_us(0);
+    for proven in PROVEN {
+        let id = proven.info.id;
+        let frames = prover.prove(&numbered(id, 1));
+        match proven.place {
+            Place::Within => {
+                assert_eq!(verifier.receive(&numbered(id, 2), now), None);
+                for bit in 8..64 {
+                    let mut data = frames[0].full_data().unwrap();
+                    data[bit / 8] ^= 1 << (bit % 8);
+                    assert_eq!(verifier.receive(&Frame::full(id, data), now), None, "bit {bit}");
+                    verifier.step(0);
+                }
+                assert_eq!(verifier.receive(&Frame::new(id, &[0; 7]).unwrap(), now), None);
+            }
+            Place::Behind(behind) => {
+                for bit in 8..64 {
+                    let mut data = frames[0].full_data().unwrap();
+                    data[bit / 8] ^= 1 << (bit % 8);
+                    assert_eq!(verifier.receive(&Frame::full(id, data), now), None);
+                    assert_eq!(verifier.receive(&frames[1], now), None, "bit {bit}");
+                    verifier.step(0);
+                }
+                assert_eq!(verifier.receive(&frames[0], now), None);
+                assert_eq!(verifier.receive(&frames[0], now), None);
+                assert_eq!(verifier.receive(&Frame::new(behind, &[0; 3]).unwrap(), now), None);
+                assert_eq!(verifier.receive(&frames[1], now), None, "nothing waits");
+            }
+        }
+    }
+    let mut expected = Vec::new();
+    for proven in PROVEN {
+        let id = proven.info.id;
+        expected.extend(match proven.place {
+            Place::Within => vec![(id, Refusal::Proof, 57), (id, Refusal::Length, 1)],
+            Place::Behind(_) => vec![
+                (id, Refusal::Proof, 56),
+                (id, Refusal::Unproven, 1),
+                (id, Refusal::NoFrame, 1),
+                (id, Refusal::Length, 1),
+            ],
+        });
+    }
+    assert_eq!(refused(&mut verifier), expected);
+}
+
+#[test]
+fn a_sender_cannot_speak_for_another() {
+    let (mut verifier, mut prover) = pair();
+    let now = Instant::from_us(0);
+    let [frame, proof] = prover.prove(&numbered(LanePreview::ID, 1))[..] else {
+        panic!("two frames")
+    };
+    let as_vehicle = Frame::full(Vehicle::ID, frame.full_data().unwrap());
+    assert_eq!(verifier.receive(&as_vehicle, now), None);
+    let proof_as_vehicle = Frame::new(0x121, proof.data()).unwrap();
+    assert_eq!(verifier.receive(&proof_as_vehicle, now), None);
+    // The camera's key under the host's identifiers.
+    let mut keys = Keys::bench(Algorithm::AesCmac);
+    keys.host = keys.camera;
+    let mut camera = Prover::new(&keys);
+    for step in 0..400 {
+        camera.prove(&numbered(Vehicle::ID, 2));
+        if let Some(frame) = verifier.step(step) {
+            for question in camera.hear(&frame, || step) {
+                verifier.receive(&question, now);
+            }
+        }
+        for frame in camera.prove(&numbered(Vehicle::ID, 3)) {
+            assert_eq!(verifier.receive(&frame, now), None);
+        }
+    }
+}
+
+#[test]
+fn a_flood_takes_no_more_macs_than_a_step_may() {
+    let (mut verifier, mut prover) = pair();
+    let now = Instant::from_us(0);
+    for _ in 0..8 {
+        assert_eq!(verifier.receive(&numbered(Request::ID, 5), now), None);
+    }
+    let [frame] = prover.prove(&numbered(Request::ID, 6))[..] else {
+        panic!("one frame")
+    };
+    assert_eq!(verifier.receive(&frame, now), None, "the ninth");
+    verifier.step(0);
+    assert_eq!(verifier.receive(&frame, now), Some((frame, now)));
+    assert_eq!(
+        refused(&mut verifier),
+        [(0x130, Refusal::Proof, 8), (0x130, Refusal::TooMany, 1)]
+    );
+}
+
+#[test]
+fn without_keys_the_ecu_says_so_and_engages_on_the_bench_alone() {
+    let now = Instant::from_us(0);
+    let keys = Keys::bench(Algorithm::SipHash);
+    let states = [
+        (Credentials::Bench, State::Bench, true, true),
+        (Credentials::None, State::NoKeys, false, true),
+        (Credentials::Keys(keys, None), State::NoStart, false, false),
+        // Epochs would come again.
+        (
+            Credentials::Keys(keys, Some(1 << 20)),
+            State::NoStart,
+            false,
+            false,
+        ),
+        (Credentials::Keys(keys, Some(0)), State::SipHash, false, false),
+    ];
+    for (credentials, state, engages, takes) in states {
+        let mut verifier = Verifier::new(credentials);
+        let request = numbered(Request::ID, 1);
+        assert_eq!(verifier.receive(&request, now), engages.then_some((request, now)));
+        let unlock = numbered(ParameterUnlock::ID, 1);
+        assert_eq!(verifier.receive(&unlock, now), takes.then_some((unlock, now)));
+        let status = Status::decode(&verifier.step(60).unwrap()).unwrap();
+        assert_eq!(status.state, state);
+        assert_eq!(status.waiting, [state == State::SipHash; 5]);
+    }
+}
+
+#[test]
+fn somebody_who_speaks_as_the_ecu_is_reported() {
+    let (mut verifier, _) = pair();
+    for id in [OFFER, STATUS_ID] {
+        assert_eq!(
+            verifier.receive(&Frame::full(id, [0; 8]), Instant::from_us(0)),
+            None
+        );
+    }
+    assert_eq!(refused(&mut verifier), [(0x100, Refusal::Foreign, 2)]);
+}
