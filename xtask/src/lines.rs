@@ -9,15 +9,14 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 26] = [
+pub(crate) const BUDGETS: [(&str, usize); 25] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
     ("bindings/python", 2_300),
     ("bindings/web", 600),
-    ("core", 7_200),
+    ("core", 7_600),
     ("core/diag", 1_600),
-    ("core/observer", 400),
     ("examples", 200),
     ("firmware", 2_800),
     ("firmware/lockstep", 200),

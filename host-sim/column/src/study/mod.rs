@@ -2,7 +2,7 @@
 //! threads and progress are whose program it is.
 //!
 //! - [`assist`]: overlay or offset, what hands feel of it, margins, what a sudden loss costs.
-//! - [`sensors`]: the hands' torque by the observer of `haptic-observer`, by the angle's sensor.
+//! - [`sensors`]: the hands' torque by the observer of core, by the angle's sensor.
 
 pub mod assist;
 pub mod sensors;

@@ -1,4 +1,4 @@
-//! What a sensor has to deliver: how late and how wrong the observer of `haptic-observer` tells the torque of the hands, by the steps and
+//! What a sensor has to deliver: how late and how wrong the observer of core tells the torque of the hands, by the steps and
 //! the rate of the angle's sensor, the observer's bandwidth, and what is believed of J_w and K_tb.
 //!
 //! The car is that of the column with the medium assist at 60 km/h; its angle is the column's. In the first half the hands steer with
@@ -6,8 +6,8 @@
 
 use std::f64::consts::TAU;
 
+use haptic_core::observer::{Observer, Parameters, Reading, Setup, SetupError, State};
 use haptic_core::quantity::{Radians, Torque};
-use haptic_observer::{Observer, Parameters, Reading, Setup, SetupError, State};
 use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::vehicle::VehicleParameters;

@@ -9,7 +9,7 @@
 
 use fixed::types::{I0F32, I8F24, I16F16};
 
-use crate::ToAngle;
+use super::ToAngle;
 
 /// Which end of the bar an angle is measured at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -81,23 +81,23 @@ impl core::fmt::Display for SetupError {
 /// Parameters as gains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Setup {
-    pub(crate) angle_at: AngleAt,
+    pub(super) angle_at: AngleAt,
     /// 1/K_tb, rad per N.m.
-    pub(crate) twist: I0F32,
+    pub(super) twist: I0F32,
     /// Rate per torque and step, rad/ms per N.m.
-    pub(crate) by_torque: I0F32,
+    pub(super) by_torque: I0F32,
     /// Damping, N.m per rad/ms.
-    pub(crate) damping: I16F16,
+    pub(super) damping: I16F16,
     /// One over what the friction gives, 1/rad.
-    pub(crate) gives: I16F16,
+    pub(super) gives: I16F16,
     /// Friction of a wheel that slides, N.m.
-    pub(crate) friction: I8F24,
+    pub(super) friction: I8F24,
     /// What an error of the angle does to angle, rate (1/ms) and torque (N.m/rad).
-    pub(crate) to_angle: ToAngle,
-    pub(crate) to_rate: I8F24,
-    pub(crate) to_torque: I16F16,
+    pub(super) to_angle: ToAngle,
+    pub(super) to_rate: I8F24,
+    pub(super) to_torque: I16F16,
     /// Most torque of hands, N.m.
-    pub(crate) most: I8F24,
+    pub(super) most: I8F24,
     lag_us: u32,
 }
 

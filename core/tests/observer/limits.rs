@@ -1,7 +1,7 @@
 //! Every limit on both sides and from both sides, extremes, and what is refused.
 
+use haptic_core::observer::{AngleAt, Limit, Observer, Parameters, Reading, Setup, State};
 use haptic_core::quantity::{Radians, Torque};
-use haptic_observer::{AngleAt, Limit, Observer, Parameters, Reading, Setup, State};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 

@@ -18,29 +18,14 @@
 //! # Formats, errors and costs
 //!
 //! Angle I32F32 rad, rate I0F32 rad/ms, torque I8F24 N.m. Beside the same equations in f64 the estimate is off by at most 6 mN.m
-//! (`tests/oracle.rs`), for bandwidths of 10 to 300 rad/s. A step has 9 products of 32 bits, no division and no loop.
+//! (`core/tests/observer/oracle.rs`), for bandwidths of 10 to 300 rad/s. A step has 9 products of 32 bits, no division and no loop.
 //!
 //! Not here: who asks for the estimate. The ECU does not use it yet; `host-sim driver-torque` prints how good it is with each sensor.
 
-#![no_std]
-#![forbid(unsafe_code)]
-// Nothing wraps, panics or computes in floating point unseen: where one of these is meant, it says why.
-#![cfg_attr(
-    not(test),
-    deny(
-        clippy::arithmetic_side_effects,
-        clippy::as_conversions,
-        clippy::float_arithmetic,
-        clippy::indexing_slicing,
-        clippy::panic,
-        clippy::unwrap_used
-    )
-)]
-
 mod setup;
 
+use crate::quantity::{Radians, Torque, TurningRate};
 use fixed::types::{I0F32, I2F30, I4F28, I8F24, I16F16, I32F32, I40F24};
-use haptic_core::quantity::{Radians, Torque, TurningRate};
 
 pub use setup::{AngleAt, Parameters, Setup, SetupError};
 

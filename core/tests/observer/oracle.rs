@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use haptic_core::observer::{AngleAt, Limit, Observer, Parameters, Reading, Setup, State};
 use haptic_core::quantity::{Radians, Torque};
-use haptic_observer::{AngleAt, Limit, Observer, Parameters, Reading, Setup, State};
 
 /// Brookner, Tracking and Kalman Filtering Made Easy, 1.3: the critically damped g-h-k filter, with the equation of the wheel as its
 /// prediction.
