@@ -18,7 +18,7 @@ use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torq
 const ECU_SIZE: usize = 4096;
 const ECU_ALIGN: usize = 8;
 /// `HG_PARAMETERS` of the header.
-const PARAMETER_COUNT: usize = 24;
+const PARAMETER_COUNT: usize = 31;
 /// In front of an ECU that was made by [`hg_ecu_init`].
 const MADE: u32 = 0x4847_4543;
 

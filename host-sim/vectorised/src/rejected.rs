@@ -36,6 +36,8 @@ reasons! {
     Camera "a camera that is late, blind at times, or on another line";
     /// Another law than the paper's.
     AnotherLaw "another law than the paper's";
+    /// A sensor that is a torsion bar.
+    TorsionBar "a torsion bar for a sensor";
     /// Exact sensors, past the bus.
     ExactSensors "exact sensors, past the bus";
     /// Slower than the controller guides.
@@ -141,6 +143,7 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
     let reasons = [
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
         (guided && params.law != 0.0, Reason::AnotherLaw),
+        (guided && params.torque_sensor != 0.0, Reason::TorsionBar),
         (guided && *sensors == Sensors::Exact, Reason::ExactSensors),
         (
             guided && heard_m_per_s < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
@@ -262,6 +265,14 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
         law: _,
         // Without their laws they do not act.
         activity_lambda_min: _,
+        torque_sensor: _,
+        // Without a bar they do not act.
+        wheel_inertia_kg_m2: _,
+        wheel_damping_nm_s: _,
+        wheel_friction_nm: _,
+        bar_stiffness_nm_per_rad: _,
+        column_period_s: _,
+        observer_bandwidth_rad_per_s: _,
     } = controller;
     controller
 }

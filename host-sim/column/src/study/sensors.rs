@@ -6,7 +6,9 @@
 
 use std::f64::consts::TAU;
 
-use haptic_core::observer::{Observer, Parameters, Reading, Setup, SetupError, State};
+use haptic_core::controller::config::{Config, hands_lag_s};
+use haptic_core::controller::params::{ParamError, Params};
+use haptic_core::observer::{Sensor, State};
 use haptic_core::quantity::{Radians, Torque};
 use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::sensors::camera_looks;
@@ -110,7 +112,7 @@ pub enum SensorsError {
     Column(#[from] ColumnError),
     /// A column that the observer cannot be set up for.
     #[error("the observer: {0}")]
-    Setup(SetupError),
+    Setup(ParamError),
 }
 
 /// What was seen in a millisecond.
@@ -154,21 +156,21 @@ fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ColumnError> {
 }
 
 /// What an observer says of a record, less the hands' torque of its lag ago: root of the mean square, N.m.
-fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
-    let observer = Observer::new(Setup::new(of).map_err(SensorsError::Setup)?);
-    let (mut state, step_rad) = (State::default(), step_deg.to_radians());
-    let lag = f64::from(observer.setup().lag_us()) * 1e-3;
+fn deviation(of: &Params, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
+    let config = Config::new(of).map_err(SensorsError::Setup)?;
+    let (mut state, step_rad) = (State::NEW, step_deg.to_radians());
+    let lag = 1e3 * hands_lag_s(of);
     let (whole, rest) = (lag.floor() as usize, lag.fract());
     let errors = seen.iter().enumerate().map(|(k, now)| {
         let is_sampled = rate == Rate::EveryStep || camera_looks(k as u32);
         let angle = is_sampled.then(|| Radians::from_rad((now.column_rad / step_rad).round() * step_rad));
         let bar_torque = Torque::from_nm(now.bar_nm);
-        let found = observer
-            .step(&mut state, &Reading { bar_torque, angle })
-            .hands
-            .nm();
+        let found = match config.sensor() {
+            Some(Sensor::Bar(observer)) => observer.step(&mut state, bar_torque, angle),
+            Some(Sensor::Hands) | None => bar_torque,
+        };
         let ago = |steps: usize| k.checked_sub(steps).map_or(0.0, |at| seen[at].hands_nm);
-        found - ((1.0 - rest) * ago(whole) + rest * ago(whole + 1))
+        found.nm() - ((1.0 - rest) * ago(whole) + rest * ago(whole + 1))
     });
     let errors: Vec<f64> = errors.collect();
     Ok(rms(errors.into_iter().skip(SETTLES)))
@@ -185,36 +187,36 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
     for rate in RATES {
         for step_deg in STEPS_DEG {
             for bandwidth in BANDWIDTHS.into_iter().filter(|w| *w <= rate.hz()) {
-                let right = Parameters {
-                    j_w: column.j_w_kg_m2,
-                    b_w: column.b_w_nms_per_rad,
-                    friction_nm: column.upper_friction_nm,
-                    friction_give_rad: column.friction_give_rad,
-                    k_tb: column.k_tb_nm_per_rad,
-                    sample_ms: 1000.0 / rate.hz(),
-                    bandwidth,
-                    ..Parameters::default()
+                let right = Params {
+                    torque_sensor: 1.0,
+                    wheel_inertia_kg_m2: column.j_w_kg_m2,
+                    wheel_damping_nm_s: column.b_w_nms_per_rad,
+                    wheel_friction_nm: column.upper_friction_nm,
+                    bar_stiffness_nm_per_rad: column.k_tb_nm_per_rad,
+                    column_period_s: 1.0 / rate.hz(),
+                    observer_bandwidth_rad_per_s: bandwidth,
+                    ..Params::PAPER
                 };
-                let error = |of: Parameters| deviation(&of, &held, step_deg, rate);
-                let wrong = |change: &dyn Fn(f64) -> Parameters, by: f64| {
+                let error = |of: Params| deviation(&of, &held, step_deg, rate);
+                let wrong = |change: &dyn Fn(f64) -> Params, by: f64| {
                     Ok::<_, SensorsError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
                 };
                 rows.push(Row {
                     step_deg,
                     rate,
                     bandwidth,
-                    lag_ms: 1e-3 * f64::from(Setup::new(&right).map_err(SensorsError::Setup)?.lag_us()),
+                    lag_ms: 1e3 * hands_lag_s(&right),
                     error_nm: error(right)?,
                     wrong_j_w_nm: wrong(
-                        &|share| Parameters {
-                            j_w: share * right.j_w,
+                        &|share| Params {
+                            wheel_inertia_kg_m2: share * right.wheel_inertia_kg_m2,
                             ..right
                         },
                         WRONG_J_W,
                     )?,
                     wrong_k_tb_nm: wrong(
-                        &|share| Parameters {
-                            k_tb: share * right.k_tb,
+                        &|share| Params {
+                            bar_stiffness_nm_per_rad: share * right.bar_stiffness_nm_per_rad,
                             ..right
                         },
                         WRONG_K_TB,
