@@ -21,11 +21,11 @@ const CORE: Arrows = &[
     // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
     ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
     ("controller", &["controller::config", "controller::injection", "controller::inputs", "quantity", "safety::envelope", "safety::faults", "safety::modes", "safety::redundant"]),
-    ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "observer", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("controller::injection", &["quantity"]),
     ("controller::inputs", &["lane", "quantity", "safety::faults", "safety::redundant"]),
-    ("controller::memory", &["law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
-    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "controller::memory", "lane", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::plausibility", "safety::ramp"]),
+    ("controller::memory", &["law", "law::activity", "law::probe", "observer", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
+    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "controller::memory", "lane", "law", "law::activity", "law::probe", "observer", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::plausibility", "safety::ramp"]),
     ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "lane", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("estimator", &["bus", "law::sine", "quantity"]),
     // The input that bus, law and checks share.
@@ -34,7 +34,7 @@ const CORE: Arrows = &[
     ("law::activity", &["law", "quantity"]),
     ("law::probe", &["law::sine", "quantity", "safety::redundant"]),
     ("law::schedule", &["quantity", "safety::redundant"]),
-    ("observer", &["quantity"]),
+    ("observer", &["quantity", "safety::redundant"]),
     ("quantity", &["safety::redundant"]),
     ("safety::actuator", &["quantity"]),
     ("safety::coast", &["lane", "quantity", "safety::redundant"]),

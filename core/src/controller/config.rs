@@ -15,7 +15,7 @@ mod monitor;
 mod sensor;
 
 use crate::controller::params::{DRIVER_ACTIVITY, LAWS, ParamError, Params, SENSORS, in_range, whole};
-use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
+use crate::estimator::{BLOCK_S, Complex, Estimator, T_NMS_RANGE_S};
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::law::{Coefficients, Law, LawWords};
@@ -233,13 +233,18 @@ impl Estimator {
     #[must_use]
     const fn new(p: &Params) -> Self {
         let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
+        let [re, im] = sensor::arm(p, turns);
         Self {
             phase_per_us: phase_per_us(p.probe_frequency_hz),
             periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,
             amplitude_nm: p.probe_amplitude_nm as f32,
-            lag: (turns * p.t_nms_s) as f32,
+            arm: Complex {
+                re: re as f32,
+                im: im as f32,
+            },
             k_nms: p.k_nms as f32,
             muscle: arm_share(p) as f32,
+            quiet: sensor::quiet(p),
         }
     }
 }

@@ -4,10 +4,14 @@ use fixed::types::{I0F32, I2F30, I8F24, I16F16};
 
 use super::first_error;
 use crate::controller::params::{ParamError, Params, in_range};
+use crate::estimator::QUIET;
 use crate::observer::{Observer, SensorWords};
+use crate::quantity::Torque;
 
 /// How far the wheel gives before it slides, rad: usual practice, as in the plant of `host-sim/column`.
 const GIVE_RAD: f64 = 0.0035;
+/// [`Estimator::quiet`](crate::estimator::Estimator) with a bar: what the observer says of a free wheel beside the probe.
+const QUIET_BEHIND_A_BAR: Torque = Torque::from_nm(0.1);
 const SAMPLES: &str = "observer_bandwidth_rad_per_s * column_period_s";
 const LOWER_DAMPING: &str = "vehicle.column_damping_nm_s - wheel_damping_nm_s";
 
@@ -60,6 +64,35 @@ pub(super) const fn sensor(p: &Params) -> SensorWords {
         to_rate: I8F24::from_bits(scaled(to_rate, 24)),
         to_torque: I16F16::from_bits(scaled(to_torque, 16)),
     })
+}
+
+/// `(1 + j*turns*t_nms)` at an angular frequency, and with a bar its product with what undoes the lags of the observer there.
+pub(super) const fn arm(p: &Params, turns: f64) -> [f64; 2] {
+    let [each, half_sample] = if p.torque_sensor == 0.0 {
+        [0.0; 2]
+    } else {
+        [
+            turns / p.observer_bandwidth_rad_per_s,
+            0.5 * turns * (p.column_period_s - 1e-3),
+        ]
+    };
+    let lags = [turns * p.t_nms_s, each, each, each, half_sample];
+    let (mut arm, mut i) = ([1.0, 0.0], 0);
+    while i < lags.len() {
+        let [re, im] = arm;
+        arm = [re - im * lags[i], im + re * lags[i]];
+        i += 1;
+    }
+    arm
+}
+
+/// Within which band T_d says that nobody holds the wheel.
+pub(super) const fn quiet(p: &Params) -> Torque {
+    if p.torque_sensor == 0.0 {
+        QUIET
+    } else {
+        QUIET_BEHIND_A_BAR
+    }
 }
 
 /// How far what is known of the hands is behind a torque that changes slowly, s: nothing with a sensor of theirs; with a bar three lags
