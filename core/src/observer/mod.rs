@@ -170,6 +170,12 @@ impl Observer {
         Torque::from_fixed(hands).within(MOST_HANDS)
     }
 
+    /// Friction of a wheel that slides.
+    #[must_use]
+    pub const fn friction(&self) -> Torque {
+        Torque::from_fixed(self.friction)
+    }
+
     /// phi_w by the angle measured.
     #[must_use]
     pub fn wheel_angle(&self, angle: Radians, bar_torque: Torque) -> Radians {

@@ -34,7 +34,8 @@ fn a_jump_of_the_angle_begins_anew_and_a_smaller_one_does_not() {
 fn hands_are_held_within_what_they_can_do() {
     for side in [1.0, -1.0] {
         for (bar_nm, expected_nm) in [(19.99, 19.99), (20.01, 20.0)] {
-            let hands = observer(&AT_WHEEL).step(&mut State::NEW, Torque::from_nm(side * bar_nm), None);
+            let mut state = State::NEW;
+            let hands = observer(&AT_WHEEL).step(&mut state, Torque::from_nm(side * bar_nm), None);
             assert!((hands.nm() - side * expected_nm).abs() < 1e-6, "{hands:?}");
         }
     }

@@ -1,5 +1,6 @@
 //! The observer of the hands' torque: its limits, beside f64 and a simulated wheel, and the ECU that uses it.
 
+mod ecu;
 mod limits;
 mod oracle;
 

@@ -40,7 +40,12 @@ impl<I: Injection> Step<'_, I> {
                 self.changed.add(ChangedParts::COLUMN);
                 // The rim of a free wheel answers the probe too: driver torques are compared where it passes zero.
                 if let Some(hands) = self.hands.filter(|_| self.memory.fast.probe.is_passing_zero()) {
-                    self.memory.fast.hands.update(hands);
+                    // How much of its friction a wheel that hardly turns has given, nobody sees.
+                    let unsure = match self.sensor {
+                        Sensor::Hands => Torque::ZERO,
+                        Sensor::Bar(observer) => observer.friction(),
+                    };
+                    self.memory.fast.hands.update(hands, unsure);
                 }
                 let angle = self.column_angle(column);
                 self.memory.plausibility.set_wheel_angle(angle);
