@@ -3,10 +3,13 @@
 //!
 //! - [`assist`]: overlay or offset, what hands feel of it, margins, what a sudden loss costs.
 //! - [`sensors`]: the hands' torque by the observer of core, by the angle's sensor.
+//! - [`ecu`]: the ECU behind the bar, where its parameters are right and where they are not.
 
 pub mod assist;
+pub mod ecu;
 pub mod sensors;
 
+use haptic_core::controller::params::Params;
 use serde::Deserialize;
 
 use crate::{BarParameters, ColumnError, Curve};
@@ -48,6 +51,11 @@ impl ColumnFile {
         Ok(file)
     }
 
+    /// The assist of the sensors' studies: the file's, or medium of the three.
+    fn medium(&self) -> Curve {
+        self.assist.clone().unwrap_or_else(|| Curve::usual(1.0))
+    }
+
     /// The curves, by name: the file's, or the three of usual practice.
     pub fn curves(&self) -> Vec<(&'static str, Curve)> {
         match &self.assist {
@@ -56,6 +64,21 @@ impl ColumnFile {
                 .map(|(name, factor)| (name, Curve::usual(factor)))
                 .into(),
         }
+    }
+}
+
+/// What an ECU is told of a file's column, whose angle comes every so many seconds.
+fn believed(file: &ColumnFile, column_period_s: f64, observer_bandwidth_rad_per_s: f64) -> Params {
+    let column = &file.column;
+    Params {
+        torque_sensor: 1.0,
+        wheel_inertia_kg_m2: column.j_w_kg_m2,
+        wheel_damping_nm_s: column.b_w_nms_per_rad,
+        wheel_friction_nm: column.upper_friction_nm,
+        bar_stiffness_nm_per_rad: column.k_tb_nm_per_rad,
+        column_period_s,
+        observer_bandwidth_rad_per_s,
+        ..Params::PAPER
     }
 }
 

@@ -16,7 +16,7 @@ use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::parts::{Acting, Vehicle};
 use serde::Serialize;
 
-use super::{ColumnFile, rms};
+use super::{ColumnFile, believed, ecu, rms};
 use crate::{Assist, ColumnError, Plant};
 
 /// Steps of the angle's sensor, degrees.
@@ -85,6 +85,8 @@ pub struct Results {
     pub bar_no_hand_nm: f64,
     /// By step, rate and bandwidth.
     pub rows: Vec<Row>,
+    /// The ECU behind the bar, by what it believes of it.
+    pub ecu: Vec<ecu::Row>,
 }
 
 impl Results {
@@ -123,13 +125,8 @@ struct Seen {
 }
 
 fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ColumnError> {
-    let curves = file.curves();
-    let curve = curves
-        .iter()
-        .find(|(name, _)| *name == "medium")
-        .unwrap_or(&curves[0]);
     let (vehicle, world) = (VehicleParameters::default(), WorldParameters::default());
-    let mut plant = Plant::new(file.column, Assist::Points(curve.1.clone()), &vehicle, &world, 45)?;
+    let mut plant = Plant::new(file.column, Assist::Points(file.medium()), &vehicle, &world, 45)?;
     let mut seen = Vec::with_capacity(HALF);
     for k in 0..HALF {
         let t = 1e-3 * k as f64;
@@ -182,21 +179,11 @@ fn deviation(of: &Params, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f6
 /// A column that cannot be.
 pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
     let [held, free] = [record(file, true)?, record(file, false)?];
-    let column = &file.column;
     let mut rows = Vec::new();
     for rate in RATES {
         for step_deg in STEPS_DEG {
             for bandwidth in BANDWIDTHS.into_iter().filter(|w| *w <= rate.hz()) {
-                let right = Params {
-                    torque_sensor: 1.0,
-                    wheel_inertia_kg_m2: column.j_w_kg_m2,
-                    wheel_damping_nm_s: column.b_w_nms_per_rad,
-                    wheel_friction_nm: column.upper_friction_nm,
-                    bar_stiffness_nm_per_rad: column.k_tb_nm_per_rad,
-                    column_period_s: 1.0 / rate.hz(),
-                    observer_bandwidth_rad_per_s: bandwidth,
-                    ..Params::PAPER
-                };
+                let right = believed(file, 1.0 / rate.hz(), bandwidth);
                 let error = |of: Params| deviation(&of, &held, step_deg, rate);
                 let wrong = |change: &dyn Fn(f64) -> Params, by: f64| {
                     Ok::<_, SensorsError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
@@ -231,5 +218,6 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
         bar_alone_nm: bar(&held),
         bar_no_hand_nm: bar(&free),
         rows,
+        ecu: ecu::run(file)?,
     })
 }
