@@ -20,6 +20,7 @@
 //!
 //! Angle I8F24 rad, rate I0F32 rad/ms, torque I8F24 N.m. Beside the same equations in f64 the estimate is off by at most 6 mN.m
 //! (`core/tests/observer/oracle.rs`), for bandwidths of 10 to 300 rad/s. A step has 9 products of 32 bits, no division and no loop.
+//! Products that reach no end of their format for any parameters in range are cut there; the others saturate.
 //!
 //! Not here: gains from SI values ([`crate::controller::config`]). `host-sim driver-torque` prints how good the estimate is with each
 //! sensor.
@@ -192,11 +193,11 @@ impl Observer {
     fn resists(&self, state: &mut State) -> I8F24 {
         let damping = I8F24::saturating_from_num(state.rate.wide_mul(self.damping));
         // A wheel that turns by all that it can give has slid: more is no more.
-        let turned = I8F24::saturating_from_num(state.rate.wide_mul(self.gives));
+        let turned = I8F24::wrapping_from_num(state.rate.wide_mul(self.gives));
         let turned = turned.min(I8F24::ONE).max(I8F24::NEG_ONE);
-        let back = I8F24::saturating_from_num(turned.saturating_abs().wide_mul(state.given));
+        let back = I8F24::wrapping_from_num(turned.saturating_abs().wide_mul(state.given));
         state.given = state.given.saturating_add(turned).saturating_sub(back);
-        let friction = I8F24::saturating_from_num(state.given.wide_mul(self.friction));
+        let friction = I8F24::wrapping_from_num(state.given.wide_mul(self.friction));
         damping.saturating_add(friction)
     }
 
@@ -205,8 +206,8 @@ impl Observer {
         let mean = (bar.wrapping_shr(1)).saturating_add(state.bar.wrapping_shr(1));
         let left = state.beside.saturating_sub(mean);
         let before = state.rate;
-        let change = nearest(left.wide_mul(self.by_torque).to_bits(), 24);
-        state.rate = before.saturating_add(I0F32::from_bits(change));
+        let change = I0F32::wrapping_from_num(left.wide_mul(self.by_torque));
+        state.rate = before.saturating_add(change);
         let mean = before.wrapping_shr(1).saturating_add(state.rate.wrapping_shr(1));
         let turned = mean.to_bits().saturating_add(1 << 7).wrapping_shr(8);
         state.angle = state.angle.saturating_add(I8F24::from_bits(turned));
@@ -218,20 +219,18 @@ impl Observer {
             begin(state, Some(sampled), bar);
             return;
         }
-        let angle = nearest(off.wide_mul(self.to_angle).to_bits(), 30);
-        state.angle = state.angle.saturating_add(I8F24::from_bits(angle));
-        let rate = nearest(off.wide_mul(self.to_rate).to_bits(), 16);
-        state.rate = state.rate.saturating_add(I0F32::from_bits(rate));
-        let beside = nearest(off.wide_mul(self.to_torque).to_bits(), 16);
-        state.beside = state.beside.saturating_add(I8F24::from_bits(beside));
+        let angle = I8F24::wrapping_from_num(off.wide_mul(self.to_angle));
+        state.angle = state.angle.saturating_add(angle);
+        let rate = I0F32::wrapping_from_num(off.wide_mul(self.to_rate));
+        state.rate = state.rate.saturating_add(rate);
+        let beside = I8F24::saturating_from_num(off.wide_mul(self.to_torque));
+        state.beside = state.beside.saturating_add(beside);
     }
 }
 
 /// The bar's twist: at most 26 rad, as a bar has at least 5 N.m/rad.
 fn twist(bar_torque: Torque, per_torque: I0F32) -> Radians {
-    Radians::from_fixed(I8F24::saturating_from_num(
-        bar_torque.fixed().wide_mul(per_torque),
-    ))
+    Radians::from_fixed(I8F24::wrapping_from_num(bar_torque.fixed().wide_mul(per_torque)))
 }
 
 /// Before the first sample nothing is known but the bar; from it on the wheel rests.
@@ -242,12 +241,4 @@ fn begin(state: &mut State, sampled: Option<I8F24>, bar: I8F24) {
         beside: bar,
         ..State::NEW
     };
-}
-
-/// The nearest of so many bits fewer, saturated: a product of two formats in the format of a state.
-fn nearest(wide: i64, cut: u32) -> i32 {
-    let half = 1_i64.wrapping_shl(cut.saturating_sub(1));
-    let near = wide.saturating_add(half).wrapping_shr(cut);
-    let edge = if near < 0 { i32::MIN } else { i32::MAX };
-    i32::try_from(near).unwrap_or(edge)
 }
