@@ -117,6 +117,8 @@ mod target {
     }
 
     impl Product {
+        /// A function of its own, so that a caller has one product on its stack and not its parts beside it.
+        #[inline(never)]
         fn new(found: Found, params: &Params, boot: Boot, cells: &Cells) -> Self {
             let origin = Origin {
                 boot,
@@ -192,8 +194,11 @@ mod target {
         /// A function of its own, for the same reason as [`begin`].
         #[inline(never)]
         fn be_product(&mut self, is_one: bool) {
-            self.product =
-                is_one.then(|| Product::new(Found::default(), &self.params, Boot::default(), &self.cells));
+            self.product = None;
+            if is_one {
+                let found = Found::default();
+                self.product = Some(Product::new(found, &self.params, Boot::default(), &self.cells));
+            }
         }
 
         fn tick(&mut self, now: Instant, place: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
