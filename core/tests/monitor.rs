@@ -681,7 +681,7 @@ fn times_are_those_of_the_clock_whatever_a_step_takes() {
     }
 }
 
-/// With a bar a torque counts that has lasted for one to two windows of 0.1 s, less 1.18 N.m for the wheel: 0.2 of friction, 2 rad/s of 0.05
+/// Behind a bar a torque counts that has lasted for one to two windows of 0.1 s, less 1.18 N.m for the wheel: 0.2 of friction, 2 rad/s of 0.05
 /// N.m.s/rad, 20 rad/s2 of 0.044 kg.m2. What swings to and fro, as the wheel's inertia does, lasts for none.
 #[test]
 fn behind_a_bar_what_lasts_has_to_be_yielded_to() {

@@ -30,7 +30,7 @@ words! {
         pub(super) share: Ratio,
         pub(super) coast: Coast,
         pub(super) ramp: Ramp,
-        /// Of the hands' torque, where the sensor is a bar.
+        /// What the observer of the hands' torque remembers, where the sensor is a bar.
         pub(super) observer: observer::State,
     }
 }

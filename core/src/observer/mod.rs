@@ -44,7 +44,7 @@ words! {
     pub struct SensorWords {
         /// [`HANDS`] or [`BAR`].
         variant: u32,
-        /// Of no meaning for the hands.
+        /// It means nothing with a sensor of the hands.
         observer: Observer,
     }
 }
