@@ -17,7 +17,7 @@ extern "C" {
 #endif
 
 /* Bytes and alignment of an ECU on every target; hg_ecu_size and hg_ecu_align say what this one takes. */
-#define HG_ECU_SIZE 4096
+#define HG_ECU_SIZE 4608
 #define HG_ECU_ALIGN 8
 
 /* Number of parameters; hg_parameter numbers them. */
