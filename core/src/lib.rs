@@ -105,6 +105,7 @@ pub mod ecu;
 pub mod estimator;
 pub mod lane;
 pub mod law;
+pub mod observer;
 pub mod quantity;
 pub mod safety;
 pub mod service;

@@ -282,7 +282,14 @@ fn parameters() {
         .iter()
         .any(|v| v.signal_name == "ParameterWrite_Value");
     assert!(is_float);
-    for (index, value) in [(0, 0.25_f32), (7, 5.0), (17, 0.001_753), (21, 0.0), (23, 0.3)] {
+    for (index, value) in [
+        (0, 0.25_f32),
+        (7, 5.0),
+        (17, 0.001_753),
+        (21, 0.0),
+        (23, 0.3),
+        (30, 100.0),
+    ] {
         let sent = ParameterWrite { index, value };
         let frame = sent.encode(index);
         assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));
@@ -292,7 +299,7 @@ fn parameters() {
         assert_eq!(decode(sent), sent);
     }
     let beyond = ParameterWrite {
-        index: 24,
+        index: 31,
         value: 1.0,
     };
     let mut data = [0; 8];

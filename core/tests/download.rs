@@ -33,6 +33,13 @@ const SET: Params = Params {
         near_time_s: 0.375,
     },
     activity_lambda_min: 0.25,
+    torque_sensor: 2.0,
+    wheel_inertia_kg_m2: 0.03125,
+    wheel_damping_nm_s: 0.0625,
+    wheel_friction_nm: 0.25,
+    bar_stiffness_nm_per_rad: 90.0,
+    column_period_s: 0.00390625,
+    observer_bandwidth_rad_per_s: 60.0,
     ..Params::PAPER
 };
 
@@ -161,7 +168,7 @@ fn a_set_with_a_gap_is_refused() {
         swapped.swap(i, (i + 1) % good.len());
         assert_eq!(receive(&lost, Mode::Standby).0, None, "frame {i} lost");
         // A first field sent again only begins anew, and before a last one came again the set was whole.
-        if i != 0 && i != 23 {
+        if i != 0 && i != 30 {
             assert_eq!(receive(&twice, Mode::Standby).0, None, "frame {i} twice");
         }
         assert_eq!(receive(&swapped, Mode::Standby).0, None, "frame {i} swapped");
@@ -236,7 +243,7 @@ fn a_value_out_of_its_range_spoils_the_set() {
 #[test]
 fn the_ends_of_every_range_are_taken() {
     type Field = fn(&mut Params) -> &mut f64;
-    let fields: [(Field, f64, f64); 24] = [
+    let fields: [(Field, f64, f64); 31] = [
         (|p| &mut p.k_1, 0.0, 4.0),
         (|p| &mut p.a_1, 0.0, 100.0),
         (|p| &mut p.a_2, 0.0, 100.0),
@@ -261,6 +268,13 @@ fn the_ends_of_every_range_are_taken() {
         (|p| &mut p.vehicle.near_time_s, 0.0, 5.0),
         (|p| &mut p.law, 0.0, 1.0),
         (|p| &mut p.activity_lambda_min, 0.05, 1.0),
+        (|p| &mut p.torque_sensor, 0.0, 2.0),
+        (|p| &mut p.wheel_inertia_kg_m2, 0.005, 0.5),
+        (|p| &mut p.wheel_damping_nm_s, 0.0, 5.0),
+        (|p| &mut p.wheel_friction_nm, 0.0, 5.0),
+        (|p| &mut p.bar_stiffness_nm_per_rad, 5.0, 1000.0),
+        (|p| &mut p.column_period_s, 0.001, 0.02),
+        (|p| &mut p.observer_bandwidth_rad_per_s, 5.0, 400.0),
     ];
     for (i, (field, min, max)) in fields.into_iter().enumerate() {
         for end in [min, max] {
@@ -270,6 +284,7 @@ fn the_ends_of_every_range_are_taken() {
                 a_3: 1.0,
                 probe_amplitude_nm: 0.1,
                 probe_frequency_hz: 1.5,
+                torque_sensor: 0.0,
                 ..SET
             };
             *field(&mut sent) = end;
@@ -475,7 +490,7 @@ fn an_ecu_that_is_locked_for_want_of_parameters_alone_takes_some() {
 fn the_values_in_use_go_round_in_their_order() {
     let expected = [0.5, 1.5, 0.25, 20.0];
     for (turn, expected) in (0..).zip(expected) {
-        for round in [0, 24, 240] {
+        for round in [0, 31, 310] {
             let told = value(&SET, turn + round).unwrap();
             assert_eq!((u32::from(told.index), told.value), (turn, expected));
         }

@@ -28,6 +28,7 @@ mod memory;
 mod modes;
 mod monitor;
 mod motor;
+mod observer;
 mod onward;
 mod params;
 mod plausibility;

@@ -680,3 +680,59 @@ fn times_are_those_of_the_clock_whatever_a_step_takes() {
         assert_eq!(steps, (1_075_000 - 1) / us + 20, "{us} us");
     }
 }
+
+/// Behind a bar a torque counts that has lasted for one to two windows of 0.1 s, less 1.18 N.m for the wheel: 0.2 of friction, 2 rad/s of 0.05
+/// N.m.s/rad, 20 rad/s2 of 0.044 kg.m2. What swings to and fro, as the wheel's inertia does, lasts for none.
+#[test]
+fn behind_a_bar_what_lasts_has_to_be_yielded_to() {
+    for sign in [1, -1] {
+        // 4 N.m against the bar: 5 - 3*(opposing - 1.18 - 0.8) is 4.05 N.m with the slack at 2.313.
+        for (bar_mnm, swings, refused) in [
+            (2_280, false, None),
+            (2_340, false, Some(100..=204)),
+            (6_000, false, Some(100..=204)),
+            (6_000, true, None),
+        ] {
+            let mut bench = Bench::at(5.0, sign * 16_384);
+            bench.monitor = behind_a_bar();
+            assert!(bench.show(None, Some(column(0)), guidance(sign * 16_384, ACTIVE), 1000));
+            let found = (1..1000).find(|ms| {
+                let side = if swings && ms / 90 % 2 == 0 { sign } else { -sign };
+                let new = (ms % 2 == 0).then(|| column(side * counts(bar_mnm).0));
+                let lane = lane(sign * 32_768, sign * 32_768, 0);
+                !bench.show(Some(lane), new, guidance(sign * 16_384, ACTIVE), 1000)
+            });
+            match refused {
+                Some(within) => assert!(
+                    found.is_some_and(|ms| within.contains(&ms)),
+                    "{bar_mnm}: {found:?}"
+                ),
+                None => assert_eq!(found, None, "{bar_mnm} {swings}"),
+            }
+        }
+    }
+}
+
+/// 1 N.m at the bar may be hands of 2.18 N.m, to which all of 4 N.m but 0.86 has to yield: it may fall so far at once.
+#[test]
+fn behind_a_bar_hands_may_be_stronger_than_it_shows() {
+    for sign in [1, -1] {
+        for (left_mnm, permitted) in [(870, true), (780, false)] {
+            let mut bench = Bench::at(5.0, sign * 16_384);
+            bench.monitor = behind_a_bar();
+            let lane = lane(sign * 32_768, sign * 32_768, 0);
+            let opposing = column(-sign * 4096);
+            assert!(bench.show(Some(lane), Some(opposing), guidance(sign * 16_384, ACTIVE), 1000));
+            let left = guidance(sign * counts(left_mnm).0, ACTIVE);
+            assert_eq!(bench.show(None, None, left, 1000), permitted, "{left_mnm}");
+        }
+    }
+}
+
+fn behind_a_bar() -> Monitor {
+    let params = Params {
+        torque_sensor: 1.0,
+        ..Params::PAPER
+    };
+    Setup::new(&params).unwrap().monitor
+}

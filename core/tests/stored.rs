@@ -47,9 +47,9 @@ fn block(version: u32, sequence: u32, values: &[f64]) -> Vec<u8> {
 }
 
 /// A different value in each field.
-const VALUES: [f64; 24] = [
+const VALUES: [f64; 31] = [
     0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.1, 2.0, 0.2, 1.5, 0.75, 0.25, 0.02, 0.001, 1.25,
-    0.5, 0.75, 0.375, 1.0, 0.625,
+    0.5, 0.75, 0.375, 1.0, 0.625, 2.0, 0.03, 0.125, 0.3, 80.0, 0.004, 60.0,
 ];
 
 fn params() -> Params {
@@ -80,6 +80,13 @@ fn params() -> Params {
         },
         law: 1.0,
         activity_lambda_min: 0.625,
+        torque_sensor: 2.0,
+        wheel_inertia_kg_m2: 0.03,
+        wheel_damping_nm_s: 0.125,
+        wheel_friction_nm: 0.3,
+        bar_stiffness_nm_per_rad: 80.0,
+        column_period_s: 0.004,
+        observer_bandwidth_rad_per_s: 60.0,
     }
 }
 
@@ -95,8 +102,8 @@ fn found(params: Params, sequence: u32, copy: usize) -> Option<Stored> {
 fn the_layout_is_the_documented_one() {
     assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
     let bytes = save(&params(), 0x0102_0304);
-    assert_eq!(bytes.to_vec(), block(4, 0x0102_0304, &VALUES));
-    assert_eq!(bytes.len(), 212);
+    assert_eq!(bytes.to_vec(), block(5, 0x0102_0304, &VALUES));
+    assert_eq!(bytes.len(), 268);
     assert_eq!(load([&bytes, &[]]), found(params(), 0x0102_0304, 0));
 }
 
@@ -155,9 +162,9 @@ fn a_write_over_the_oldest_copy_cut_short_at_any_byte() {
 
 #[test]
 fn other_versions_and_values_out_of_range_are_no_good() {
-    assert_eq!(load([&block(3, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(5, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(4, 1, &VALUES[..23]), &[]]), None);
+    assert_eq!(load([&block(4, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(6, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(5, 1, &VALUES[..30]), &[]]), None);
     let ranges_end = [
         (0, 4.1),
         (5, 0.4),
@@ -179,11 +186,18 @@ fn other_versions_and_values_out_of_range_are_no_good() {
         (21, f64::NAN),
         (22, 0.5),
         (23, 1.1),
+        (24, 1.5),
+        (25, 0.004),
+        (26, 5.1),
+        (27, -0.1),
+        (28, 4.9),
+        (29, 0.021),
+        (30, 401.0),
     ];
     for (index, value) in ranges_end {
         let mut values = VALUES;
         values[index] = value;
-        assert_eq!(load([&block(4, 1, &values), &[]]), None, "value {index}");
+        assert_eq!(load([&block(5, 1, &values), &[]]), None, "value {index}");
     }
 }
 
@@ -201,7 +215,7 @@ fn absurd_values_within_range_are_accepted() {
     let mut values = VALUES;
     values[..5].fill(0.0);
     values[6] = 0.1;
-    let stored = load([&block(4, 1, &values), &[]]).unwrap();
+    let stored = load([&block(5, 1, &values), &[]]).unwrap();
     assert_eq!(stored.set.params.torque_limit_nm, 0.1);
     assert!(Setup::new(&stored.set.params).is_ok());
 }

@@ -48,6 +48,10 @@ pub struct Origin {
 }
 
 /// What a service asks of its image.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one at a time, and nothing to allocate it with"
+)]
 pub enum Restart {
     /// Store this set, and start with it.
     With(Set),

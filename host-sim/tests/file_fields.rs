@@ -331,8 +331,12 @@ fn every_range_of_a_scenario_is_the_codes() {
             let beyond = if to.is_finite() { 1e-3 * (to - from) } else { 1.0 };
             let outside = [from - beyond, to + beyond];
             for value in outside.into_iter().filter(|value| value.is_finite()) {
-                let expected = if row.refused() == "guidance.law" {
-                    format!("s: guidance.law = {value} is not a whole number from 0 to 1")
+                let expected = if ["guidance.law", "guidance.torque_sensor"].contains(&row.refused().as_str())
+                {
+                    format!(
+                        "s: {} = {value} is not a whole number from {from} to {to}",
+                        row.refused()
+                    )
                 } else {
                     format!(
                         "s: {} = {value}{unit} is outside {}{unit}",

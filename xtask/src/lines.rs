@@ -9,15 +9,14 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 27] = [
+pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
     ("bindings/python", 2_300),
     ("bindings/web", 600),
-    ("core", 7_200),
+    ("core", 7_600),
     ("core/diag", 1_400),
-    ("core/observer", 400),
     ("core/secoc", 800),
     ("examples", 200),
     ("firmware", 3_000),
@@ -26,14 +25,14 @@ pub(crate) const BUDGETS: [(&str, usize); 27] = [
     ("host-sim/analysis", 9_100),
     ("host-sim/batch", 10_000),
     ("host-sim/campaign", 4_000),
-    ("host-sim/column", 1_300),
+    ("host-sim/column", 1_600),
     ("host-sim/evidence", 6_900),
     ("host-sim/log", 5_800),
     ("host-sim/metrics", 600),
     ("host-sim/pil", 2_200),
     ("host-sim/report", 6_450),
     ("host-sim/sim", 9_700),
-    ("host-sim/vectorised", 2_810),
+    ("host-sim/vectorised", 2_900),
     ("host-sim/vehicle", 1_700),
     ("xtask", 7_000),
     ("xtask/log", 100),

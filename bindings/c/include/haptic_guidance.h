@@ -17,11 +17,11 @@ extern "C" {
 #endif
 
 /* Bytes and alignment of an ECU on every target; hg_ecu_size and hg_ecu_align say what this one takes. */
-#define HG_ECU_SIZE 4096
+#define HG_ECU_SIZE 4608
 #define HG_ECU_ALIGN 8
 
 /* Number of parameters; hg_parameter numbers them. */
-#define HG_PARAMETERS 24
+#define HG_PARAMETERS 31
 
 /* Torque of one count of hg_step.torque_raw: 2^-12 N.m, as on the bus. */
 #define HG_TORQUE_LSB_NM (1.0 / 4096.0)
@@ -87,7 +87,14 @@ typedef enum hg_parameter {
     HG_VEHICLE_FAR_TIME_S = 20,
     HG_VEHICLE_NEAR_TIME_S = 21,
     HG_LAW = 22,
-    HG_ACTIVITY_LAMBDA_MIN = 23
+    HG_ACTIVITY_LAMBDA_MIN = 23,
+    HG_TORQUE_SENSOR = 24,
+    HG_WHEEL_INERTIA_KG_M2 = 25,
+    HG_WHEEL_DAMPING_NM_S = 26,
+    HG_WHEEL_FRICTION_NM = 27,
+    HG_BAR_STIFFNESS_NM_PER_RAD = 28,
+    HG_COLUMN_PERIOD_S = 29,
+    HG_OBSERVER_BANDWIDTH_RAD_PER_S = 30
 } hg_parameter;
 
 /* A classic CAN data frame. */

@@ -15,10 +15,10 @@ use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 /// `HG_ECU_SIZE` and `HG_ECU_ALIGN` of the header.
-const ECU_SIZE: usize = 4096;
+const ECU_SIZE: usize = 4608;
 const ECU_ALIGN: usize = 8;
 /// `HG_PARAMETERS` of the header.
-const PARAMETER_COUNT: usize = 24;
+const PARAMETER_COUNT: usize = 31;
 /// In front of an ECU that was made by [`hg_ecu_init`].
 const MADE: u32 = 0x4847_4543;
 

@@ -12,12 +12,14 @@
 )]
 
 mod monitor;
+mod sensor;
 
-use crate::controller::params::{DRIVER_ACTIVITY, LAWS, ParamError, Params, WHOLE, in_range};
-use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
+use crate::controller::params::{DRIVER_ACTIVITY, LAWS, ParamError, Params, SENSORS, in_range, whole};
+use crate::estimator::{BLOCK_S, Complex, Estimator, T_NMS_RANGE_S};
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::law::{Coefficients, Law, LawWords};
+use crate::observer::{Sensor, SensorWords};
 use crate::quantity::{
     CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
     TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
@@ -27,6 +29,7 @@ use crate::safety::monitor::Monitor;
 use crate::safety::plausibility::Plausibility;
 use crate::safety::redundant::words;
 use monitor::monitor_band_nm;
+pub use sensor::hands_lag_s;
 
 words! {
     /// The checked configuration of every block of the controller.
@@ -43,6 +46,8 @@ words! {
         pub probe: Probe,
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
+        /// What the column's sensor measures: [`Config::sensor`].
+        sensor: SensorWords,
     }
 }
 
@@ -80,37 +85,32 @@ impl Config {
         self.law.law()
     }
 
+    /// The sensor of the column; `None` where the memory is damaged.
+    #[must_use]
+    pub const fn sensor(&self) -> Option<Sensor<'_>> {
+        self.sensor.sensor()
+    }
+
     const fn check(p: &Params) -> Result<(), ParamError> {
-        // Before its range, so that a law that there is not is refused in one way, be it 3 or 0.5.
-        if !(p.law == 0.0 || p.law == DRIVER_ACTIVITY) {
-            return Err(ParamError {
-                name: "law",
-                value: p.law,
-                min: 0.0,
-                max: (LAWS.len() - 1) as f64,
-                unit: WHOLE,
-            });
-        }
-        if let Err(error) = p.check() {
+        // Before their ranges, so that a law or sensor that there is not is refused in one way, be it 3 or 0.5.
+        let choices = [
+            whole("law", p.law, LAWS.len()),
+            whole("torque_sensor", p.torque_sensor, SENSORS.len()),
+            p.check(),
+        ];
+        if let Err(error) = first_error(&choices) {
             return Err(error);
         }
         let slope = 2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz;
         let gains = [0.0, MAX_GAIN];
-        let products = [
+        first_error(&[
             in_range(PROBE_SLOPE, slope, [0.0, MAX_PROBE_SLOPE], "N.m/s"),
             in_range("k_1 * a_1", p.k_1 * p.a_1, gains, "N.m/m"),
             in_range("k_1 * a_2", p.k_1 * p.a_2, gains, "N.m.s/m"),
             in_range("k_1 * a_3", p.k_1 * p.a_3, gains, "N.m/rad"),
             in_range("k_1 * a_4", p.k_1 * p.a_4, gains, "N.m.s/rad"),
-        ];
-        let mut i = 0;
-        while i < products.len() {
-            if let Err(error) = products[i] {
-                return Err(error);
-            }
-            i += 1;
-        }
-        Ok(())
+            sensor::check(p),
+        ])
     }
 
     /// The configuration of parameters that are in range.
@@ -128,7 +128,7 @@ impl Config {
                 curvature_gain: CurvaturePerAngle::from_per_m(v.curvature_gain_per_m),
                 stability_factor: StabilityFactor::from_s2_per_m2(v.stability_factor_s2_per_m2),
                 aligning_gain: TorquePerAcceleration::from_nm_s2_per_m(v.aligning_gain_nm_s2_per_m),
-                column_damping: TorquePerTurningRate::from_nm_s_per_rad(v.column_damping_nm_s),
+                column_damping: TorquePerTurningRate::from_nm_s_per_rad(sensor::lower_damping(p)),
                 far_time: Seconds::from_s(v.far_time_s),
                 near_time: Seconds::from_s(v.near_time_s),
                 between: Micros::from_us(between_us),
@@ -139,8 +139,21 @@ impl Config {
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
             schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
+            sensor: sensor::sensor(p),
         }
     }
+}
+
+/// The first error of a list.
+const fn first_error(checks: &[Result<(), ParamError>]) -> Result<(), ParamError> {
+    let mut i = 0;
+    while i < checks.len() {
+        if let Err(error) = checks[i] {
+            return Err(error);
+        }
+        i += 1;
+    }
+    Ok(())
 }
 
 /// The law of parameters that are in range.
@@ -220,13 +233,18 @@ impl Estimator {
     #[must_use]
     const fn new(p: &Params) -> Self {
         let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
+        let [re, im] = sensor::arm(p, turns);
         Self {
             phase_per_us: phase_per_us(p.probe_frequency_hz),
             periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,
             amplitude_nm: p.probe_amplitude_nm as f32,
-            lag: (turns * p.t_nms_s) as f32,
+            arm: Complex {
+                re: re as f32,
+                im: im as f32,
+            },
             k_nms: p.k_nms as f32,
             muscle: arm_share(p) as f32,
+            quiet: sensor::quiet(p),
         }
     }
 }

@@ -30,7 +30,8 @@ impl<T: Copy> Input<T> {
 }
 
 words! {
-    /// Driver torque and wheel angle.
+    /// Driver torque and wheel angle. Where the sensor is a torsion bar the torque is the bar's, and the angle that of the end that the
+    /// parameters say.
     #[derive(Default)]
     pub struct ColumnState {
         /// T_d on the wheel.

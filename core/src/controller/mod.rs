@@ -39,6 +39,8 @@ pub struct Command {
     pub faults: FaultSet,
     /// The driver has to take over.
     pub warning: bool,
+    /// The hands' torque that it went by; `None` without a column.
+    pub hands: Option<Torque>,
 }
 
 /// What the controller remembers from step to step.
@@ -82,6 +84,7 @@ impl ControllerState {
             mode: Mode::Fault,
             faults,
             warning: true,
+            hands: None,
         }
     }
 }
@@ -138,8 +141,8 @@ impl Controller {
             return state.lose_memory(now);
         }
         let config = self.config.value();
-        // Both copies agree on a law that there is not: a memory fault as any other.
-        let Some(law) = config.law() else {
+        // Both copies agree on a law or a sensor that there is not: a memory fault as any other.
+        let (Some(law), Some(sensor)) = (config.law(), config.sensor()) else {
             return state.lose_memory(now);
         };
         let memory = state.memory.value_mut();
@@ -148,6 +151,7 @@ impl Controller {
         let mut step = Step {
             config,
             law,
+            sensor,
             now,
             elapsed,
             applied,
@@ -155,6 +159,7 @@ impl Controller {
             injection,
             lane: inputs.lane,
             is_late: false,
+            hands: None,
             memory,
             changed: ChangedParts::NOTHING,
             once: &mut state.once,

@@ -41,6 +41,10 @@ pub const LAWS: [&str; 2] = ["paper", "driver_activity"];
 /// [`Params::law`] of driver activity.
 pub const DRIVER_ACTIVITY: f64 = 1.0;
 
+/// The sensors of the column, in the order of the parameter `torque_sensor`: the hands' torque, or that of a bar beside the angle of its
+/// column or of its wheel.
+pub const SENSORS: [&str; 3] = ["hands", "bar_and_column_angle", "bar_and_wheel_angle"];
+
 /// [`ParamError::unit`] of a parameter that has to be a whole number.
 pub const WHOLE: &str = "in whole numbers";
 
@@ -184,6 +188,21 @@ parameters! {
         law: "1", 0.0 to 1.0, 0.0;
         /// Least share of equation (9) that driver activity leaves to a driver who works against it.
         activity_lambda_min: "1", 0.05 to 1.0, 0.3;
+        /// What the Column message carries: 0 is the hands' torque, 1 a torsion bar's and the angle of its column, 2 a bar's and the
+        /// angle of its wheel. The rest of this list counts with a bar alone.
+        torque_sensor: "1", 0.0 to 2.0, 0.0;
+        /// J_w, inertia of the wheel on its bar.
+        wheel_inertia_kg_m2: "kg.m2", 0.005 to 0.5, 0.044;
+        /// B_w, damping of the wheel.
+        wheel_damping_nm_s: "N.m.s/rad", 0.0 to 5.0, 0.05;
+        /// Dry friction of the wheel.
+        wheel_friction_nm: "N.m", 0.0 to 5.0, 0.2;
+        /// K_tb, stiffness of the bar.
+        bar_stiffness_nm_per_rad: "N.m/rad", 5.0 to 1000.0, 143.24;
+        /// Time between two Column messages, as the observer of the hands' torque takes it.
+        column_period_s: "s", 0.001 to 0.02, 0.002;
+        /// Bandwidth of that observer; times the period at most 1. What it tells is three lags of 1/bandwidth late.
+        observer_bandwidth_rad_per_s: "rad/s", 5.0 to 400.0, 100.0;
     }
 }
 
@@ -250,6 +269,20 @@ impl Params {
         }
         Ok(())
     }
+}
+
+/// Refuses what is none of the whole numbers below `end`, be it too large or broken, in one way.
+pub(crate) const fn whole(name: &'static str, value: f64, end: usize) -> Result<(), ParamError> {
+    if value >= 0.0 && value < end as f64 && value == value as u32 as f64 {
+        return Ok(());
+    }
+    Err(ParamError {
+        name,
+        value,
+        min: 0.0,
+        max: (end - 1) as f64,
+        unit: WHOLE,
+    })
 }
 
 /// A bound that an f32 does not hold must not refuse the f32 next to it.

@@ -251,10 +251,11 @@ impl Ecu {
                 mode: Mode::Fault,
                 faults: command.faults.union(faults),
                 warning: true,
+                hands: command.hands,
             };
             guidance = self.guidance(&command, steps);
         }
-        let sample = sample(&inputs.column, now, applied);
+        let sample = sample(&inputs.column, command.hands, now, applied);
         self.background.take(sample, command.probe);
         self.history.step(now, command.faults);
         let others = self.others(&command, steps);
@@ -382,12 +383,17 @@ fn has_test_come(is_due: &mut bool, steps: u32, inputs: &Inputs) -> bool {
 
 /// A new sample of the column for the estimator, if one came.
 #[inline(always)]
-fn sample(column: &Input<ColumnState>, now: Instant, applied: Torque) -> Option<Sample> {
+fn sample(
+    column: &Input<ColumnState>,
+    hands: Option<Torque>,
+    now: Instant,
+    applied: Torque,
+) -> Option<Sample> {
     match column {
         Input::New(column) => Some(Sample {
             at: now,
             applied,
-            driver_torque: column.driver_torque,
+            driver_torque: hands.unwrap_or(column.driver_torque),
             wheel_angle: column.wheel_angle,
         }),
         _ => None,

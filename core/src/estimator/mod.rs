@@ -56,20 +56,21 @@ pub struct Estimator {
     pub(crate) periods: u32,
     /// Probe's amplitude, N.m.
     pub(crate) amplitude_nm: f32,
-    /// `w*t_nms`.
-    pub(crate) lag: f32,
+    /// What makes of the measured T_d that of the arm in front of its muscles: `1 + j*w*t_nms`, times the lags of an observer.
+    pub(crate) arm: Complex,
     /// K_nms, N.m/rad.
     pub(crate) k_nms: f32,
     /// Largest error of K_hg, as a share of it, that another t_nms of [`T_NMS_RANGE_S`] makes.
     pub(crate) muscle: f32,
+    /// If T_d stays within this band for half a block, nobody holds the wheel.
+    pub(crate) quiet: Torque,
 }
 
 /// The range of t_nms of drivers' arms, s. The reported deviation covers the error that any of them causes.
 pub const T_NMS_RANGE_S: [f64; 2] = [0.06, 0.15];
 
-/// If T_d stays within this band for half a block, nobody holds the wheel: 0.012 N.m, one digit of the sensor up and
-/// down, in units of 2^-24 N.m.
-const QUIET: i32 = 201_327;
+/// [`Estimator::quiet`] with a sensor of the hands' torque: 0.012 N.m, one digit of it up and down.
+pub(crate) const QUIET: Torque = Torque::from_bits(201_327);
 
 /// One sample of the column with the torque that was applied until then.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,9 +131,9 @@ struct Block {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Complex {
-    re: f32,
-    im: f32,
+pub(crate) struct Complex {
+    pub(crate) re: f32,
+    pub(crate) im: f32,
 }
 
 impl Complex {
@@ -187,7 +188,7 @@ impl Estimator {
             return;
         };
         let [low, high] = state.band;
-        let (quiet, before) = (high.saturating_sub(low) < QUIET, state.quiet);
+        let (quiet, before) = (high.saturating_sub(low) < self.quiet.bits(), state.quiet);
         (state.band, state.quiet) = (NO_BAND, quiet);
         if quiet || before {
             // Even a driver who relies fully on the guidance changes the torque a little; a free wheel does not.
@@ -275,8 +276,9 @@ impl Estimator {
             applied,
             ..
         } = block;
-        let re = driver.re - self.lag * driver.im + self.k_nms * wheel.re;
-        let im = driver.im + self.lag * driver.re + self.k_nms * wheel.im;
+        let arm = &self.arm;
+        let re = arm.re * driver.re - arm.im * driver.im + self.k_nms * wheel.re;
+        let im = arm.re * driver.im + arm.im * driver.re + self.k_nms * wheel.im;
         let power = applied.re * applied.re + applied.im * applied.im;
         // The coefficient of a sine is half its amplitude times the sum of the window's weights.
         let least = LEAST_SHARE * 0.5 * self.amplitude_nm * block.weight;

@@ -41,9 +41,11 @@ impl HandsState {
         time_hands_off: Micros::from_us(0),
     };
 
-    /// Takes a new driver torque, and resets the time if a hand is felt in it.
-    pub fn update(&mut self, driver: Torque) {
-        if driver.abs() > HELD || driver.plus(self.reference.opposite()).abs() > FELT {
+    /// Takes a new driver torque, and resets the time if a hand is felt in it, by more than the torque may be wrong beyond the offset and the
+    /// noise of a sensor of the hands' torque.
+    pub fn update(&mut self, driver: Torque, unsure: Torque) {
+        let change = driver.plus(self.reference.opposite());
+        if driver.abs() > HELD.plus(unsure) || change.abs() > FELT.plus(unsure) {
             (self.reference, self.time_hands_off) = (driver, Micros::from_us(0));
         }
     }
@@ -77,7 +79,7 @@ mod tests {
 
     fn let_go(felt: Torque) -> HandsState {
         let mut state = HandsState::NEW;
-        state.update(felt);
+        state.update(felt, Torque::ZERO);
         state.add_guided_time(ACTS, Micros::from_ms(500));
         state
     }
@@ -89,14 +91,14 @@ mod tests {
             let signed = |torque: Torque| if sign < 0 { torque.opposite() } else { torque };
             // From an offset on: as much as FELT beside it is none, a bit more is one.
             let mut state = let_go(signed(Torque::from_nm(0.2)));
-            state.update(signed(Torque::from_nm(0.2).plus(FELT)));
+            state.update(signed(Torque::from_nm(0.2).plus(FELT)), Torque::ZERO);
             assert_eq!(hands_off_ms(&state), 500);
-            state.update(signed(Torque::from_nm(0.2).plus(FELT).plus(bit)));
+            state.update(signed(Torque::from_nm(0.2).plus(FELT).plus(bit)), Torque::ZERO);
             assert_eq!(hands_off_ms(&state), 0);
             // The same torque all the time.
             for (torque, left) in [(HELD, 500), (HELD.plus(bit), 0)] {
                 let mut state = let_go(signed(torque));
-                state.update(signed(torque));
+                state.update(signed(torque), Torque::ZERO);
                 assert_eq!(hands_off_ms(&state), left, "{torque:?}");
             }
         }

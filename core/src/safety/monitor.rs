@@ -32,6 +32,11 @@ words! {
         pub(crate) probe_mnm: i32,
         /// Equation (9), mN.m per m, per rad, per m/s, per rad/s.
         pub(crate) gains_mnm: [i32; 4],
+        /// How long a driver's torque has to last until guidance has to yield to it, and how far it may be from the hands'. With a bar
+        /// both are above zero, as it shows the wheel's inertia and friction too and the controller knows the hands later; a sensor of
+        /// the hands' torque needs neither.
+        pub(crate) window_us: i32,
+        pub(crate) margin_mnm: i32,
     }
 }
 
@@ -47,7 +52,10 @@ words! {
     /// The part that most steps change.
     pub(crate) struct StepState {
         torque_mnm: i32,
-        driver_mnm: i32,
+        /// Least and largest driver torque of the window that goes on, and of the one before it.
+        driver_mnm: [[i32; 2]; 2],
+        /// Since when it goes on.
+        window_us: i32,
         /// Time since the lane sample in use was taken.
         age_us: i32,
         /// Time since a picture came, in use or not.
@@ -185,7 +193,8 @@ impl MonitorState {
     pub const NEW: Self = Self {
         step: StepState {
             torque_mnm: 0,
-            driver_mnm: 0,
+            driver_mnm: [[0; 2]; 2],
+            window_us: 0,
             age_us: 0,
             unheard_us: 0,
             aside_us: 0,
@@ -219,7 +228,7 @@ impl Monitor {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if state.observe(evidence, elapsed_us) {
+        if state.observe(evidence, elapsed_us, self.window_us) {
             self.update_demand(state);
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
@@ -246,12 +255,12 @@ impl Monitor {
             || mode > LAST_WITH_TORQUE
             || (mode == HANDOVER && fallen <= within(self.fall_mnm_per_ms.saturating_mul(DISTRUSTED)))
             || left.saturating_add(OVERRIDE_SLACK_MNM)
-                >= self.bound(state.step.torque_mnm, state.step.driver_mnm);
+                >= self.bound(state.step.torque_mnm, self.at_most(state));
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
             && grown <= allowed
             && may_fall
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
-            && self.leaves_the_driver_in_charge(torque, state.step.driver_mnm)
+            && self.leaves_the_driver_in_charge(torque, self.at_least(state))
             && (mode != ACTIVE || self.follows_the_lane(state, torque));
         state.step.torque_mnm = torque;
         state.step.withdrawn |= i32::from(!agrees);
@@ -266,6 +275,23 @@ impl Monitor {
         Self {
             band_mnm: self.limit_mnm,
             ..self
+        }
+    }
+
+    /// What a hand has certainly done, for all that the readings of the last one or two windows say.
+    fn at_least(&self, state: &MonitorState) -> i32 {
+        let [low, high] = state.driver_range();
+        let low = low.saturating_sub(self.margin_mnm).max(0);
+        low.saturating_add(high.saturating_add(self.margin_mnm).min(0))
+    }
+
+    /// The most that a hand may have done against the torque.
+    fn at_most(&self, state: &MonitorState) -> i32 {
+        let [low, high] = state.driver_range();
+        if state.step.torque_mnm.is_negative() {
+            high.saturating_add(self.margin_mnm)
+        } else {
+            low.saturating_sub(self.margin_mnm)
         }
     }
 
@@ -365,7 +391,7 @@ impl Monitor {
             0 => (torque, mode) = (self.limit_mnm.saturating_add(20), FADE),
             1 => grown = torque,
             2 => mode = STANDBY,
-            3 => state.step.driver_mnm = -20_000,
+            3 => state.step.driver_mnm = [[-20_000; 2]; 2],
             4 => state.step.age_us = 2_000_000,
             5 => (torque, grown) = (0, -400),
             _ => (torque, state.step.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
@@ -384,10 +410,11 @@ impl Monitor {
 
 impl MonitorState {
     /// Takes the frames that arrived. Returns whether there is a new lane sample to go by.
-    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32, window_us: i32) -> bool {
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
         self.step.unheard_us = self.step.unheard_us.saturating_add(elapsed_us);
         self.step.aside_us = self.step.aside_us.saturating_sub(elapsed_us).max(0);
+        self.step.window_us = self.step.window_us.saturating_add(elapsed_us);
         let frames = evidence.frames;
         let may_be_aside = frames.new.lane && self.may_leave_aside();
         let is_newer = frames.new.lane && !(may_be_aside && says_aside(evidence.guidance));
@@ -414,13 +441,34 @@ impl MonitorState {
             self.step.aside_us = 0;
         }
         if frames.new.column {
-            self.step.driver_mnm = field(&frames.column, 12, 18).saturating_mul(1000) / 4096;
+            let driver = field(&frames.column, 12, 18).saturating_mul(1000) / 4096;
+            self.see_driver(driver, window_us);
         }
         self.step.probe_left_us = self.step.probe_left_us.saturating_sub(elapsed_us).max(0);
         if frames.new.request && field(&frames.request, 21, 1) != 0 {
             self.step.probe_left_us = PROBE_END_US;
         }
         is_newer
+    }
+
+    /// Takes a driver torque. What is older than two windows does not count.
+    fn see_driver(&mut self, driver: i32, length_us: i32) {
+        let [now, before] = &mut self.step.driver_mnm;
+        let passed_us = self.step.window_us;
+        if passed_us < length_us {
+            let [low, high] = *now;
+            *now = [low.min(driver), high.max(driver)];
+            return;
+        }
+        let is_old = passed_us >= length_us.saturating_mul(2);
+        *before = if is_old { [driver; 2] } else { *now };
+        (*now, self.step.window_us) = ([driver; 2], 0);
+    }
+
+    /// Least and largest driver torque of the window that goes on and the one before.
+    fn driver_range(&self) -> [i32; 2] {
+        let [[low, high], [low_before, high_before]] = self.step.driver_mnm;
+        [low.min(low_before), high.max(high_before)]
     }
 
     /// Takes note of a picture that came, and says whether it may be left aside, as one of another line. A guidance frame that claims one

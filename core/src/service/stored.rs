@@ -6,8 +6,8 @@
 //! | 4..8 | sequence number, u32; the newer of two good copies counts, across a wrap |
 //! | 8..12 | the number of the processor that wrote it, u32 |
 //! | 12..16 | the number of the vehicle that it is for, u32; 0: nobody said |
-//! | 16..208 | the parameters in the order of [`PARAMETERS`], SI, f64 |
-//! | 208..212 | CRC-32 (ISO-HDLC, as in zlib) of all before |
+//! | 16..264 | the parameters in the order of [`PARAMETERS`], SI, f64 |
+//! | 264..268 | CRC-32 (ISO-HDLC, as in zlib) of all before |
 //!
 //! All little-endian. Who writes puts the next sequence number into the copy that was *not* loaded, so that a
 //! write that power cuts short leaves the previous set in use. Not here: the memory itself, and what to do
@@ -25,7 +25,7 @@ use crate::controller::params::{PARAMETERS, Params};
 pub const BYTES: usize = 16 + 8 * VALUES + 4;
 const VALUES: usize = PARAMETERS.len();
 /// Counts up with every change of the list of parameters: a copy of another layout is no copy.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// Parameters, and whom they are for.

@@ -1,7 +1,7 @@
 //! The studies, against what is known without them.
 
 use haptic_column::study::assist::{Column, Group, Study};
-use haptic_column::study::{ColumnFile, sensors};
+use haptic_column::study::{ColumnFile, ecu, sensors};
 use haptic_sim::models::torsion_bar::{ColumnParameters, Inject};
 
 /// By hand, from the points: at 60 km/h medium's slope is 0.5 on a straight and 3.5 at 2 N.m; held hands feel 1/(1 + g) of an overlay
@@ -91,4 +91,23 @@ fn a_file_names_what_is_wrong_with_it() {
     assert_eq!(own.curves()[0].0, "the file's");
     assert_eq!(sensors::run(&own).unwrap().curve, "the file's");
     assert_eq!(own.column, ColumnParameters::default());
+}
+
+/// Guidance acts all the time, so that a warning comes after 15 s of it; the estimate is 30 ms late.
+#[test]
+fn the_ecu_behind_a_bar_knows_hands_from_none_where_its_parameters_are_right() {
+    let rows = ecu::run(&ColumnFile::default()).unwrap();
+    let row = |believed: &str| rows.iter().find(|row| row.believed == believed).unwrap();
+    let right = row("as it is");
+    for warned in [right.warned_s, right.warned_beside_probe_s] {
+        assert!(warned.is_some_and(|s| (15.0..16.0).contains(&s)), "{right:?}");
+    }
+    assert_eq!(right.falsely_warned_s, None);
+    assert!(right.yields_ms.is_some_and(|ms| ms <= 60), "{right:?}");
+    assert_eq!(right.found, []);
+    // Where it takes the bar for the hands, a wheel that nobody holds is held, and it yields later.
+    let hands = row("hands, where a bar is");
+    assert_eq!((hands.warned_s, hands.warned_beside_probe_s), (None, None));
+    assert!(hands.yields_ms > right.yields_ms, "{hands:?}");
+    assert_eq!(row("a bar, where hands are").found[0].0, "ColumnImplausible");
 }

@@ -38,6 +38,8 @@ reasons! {
     TorsionBar "a torsion bar";
     /// Another law than the paper's.
     AnotherLaw "another law than the paper's";
+    /// A sensor that is a torsion bar.
+    BarSensor "an ECU whose sensor is a torsion bar";
     /// Exact sensors, past the bus.
     ExactSensors "exact sensors, past the bus";
     /// Slower than the controller guides.
@@ -147,6 +149,7 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
         (column.has_bar(), Reason::TorsionBar),
         (guided && params.law != 0.0, Reason::AnotherLaw),
+        (guided && params.torque_sensor != 0.0, Reason::BarSensor),
         (guided && *sensors == Sensors::Exact, Reason::ExactSensors),
         (
             guided && heard_m_per_s < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
@@ -268,6 +271,14 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
         law: _,
         // Without their laws they do not act.
         activity_lambda_min: _,
+        torque_sensor: _,
+        // Without a bar they do not act.
+        wheel_inertia_kg_m2: _,
+        wheel_damping_nm_s: _,
+        wheel_friction_nm: _,
+        bar_stiffness_nm_per_rad: _,
+        column_period_s: _,
+        observer_bandwidth_rad_per_s: _,
     } = controller;
     controller
 }

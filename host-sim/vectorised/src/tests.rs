@@ -399,6 +399,10 @@ fn what_cannot_be_vectorised_is_named_and_rejected() {
     guidance.controller.law = DRIVER_ACTIVITY;
     let another = Scenario::builder().guidance(guidance).build().unwrap();
     assert_eq!(unsupported_reason(&another), Some(Reason::AnotherLaw));
+    let mut guidance = GuidanceParameters::default();
+    guidance.controller.torque_sensor = 1.0;
+    let bar = Scenario::builder().guidance(guidance).build().unwrap();
+    assert_eq!(unsupported_reason(&bar), Some(Reason::BarSensor));
     let equal = Speed::by_time_kmh(vec![0.0, 50.0], &[60.0; 2]);
     let equal = Scenario::builder().speed(equal).build().unwrap();
     assert_eq!(unsupported_reason(&equal), None);

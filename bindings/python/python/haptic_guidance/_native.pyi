@@ -79,6 +79,13 @@ class GuidanceTable(TypedDict, total=False):
     high_speed_share: float
     law: float
     activity_lambda_min: float
+    torque_sensor: float
+    wheel_inertia_kg_m2: float
+    wheel_damping_nm_s_nms_per_rad: float
+    wheel_friction_nm: float
+    bar_stiffness_nm_per_rad: float
+    column_period_s: float
+    observer_bandwidth_rad_per_s: float
     t_n_s: float
     t_f_s: float
     probe: bool

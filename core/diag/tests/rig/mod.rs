@@ -61,6 +61,7 @@ impl Rig {
                 mode: Mode::Standby,
                 faults: FaultSet::NONE,
                 warning: false,
+                hands: None,
             },
             params: Some(Params::PAPER),
             stored: None,

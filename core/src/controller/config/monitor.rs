@@ -20,10 +20,23 @@ pub(super) const fn monitor_band_nm(p: &Params) -> f64 {
     f64::max(LEAST_BAND_NM, 2.0 * (a_rate + theta_rate + ahead) + carried)
 }
 
+/// How long a bar's torque has to last, us, until the controller knows the hands, and how far it may be from theirs meanwhile, mN.m.
+/// After ten time constants the observer's three lags leave 0.3 %. Hands that throw a wheel change its speed by 20 rad/s2, to 2 rad/s
+/// within a tenth of a second; so much of the torque goes into its friction, damping and inertia, and not through the bar.
+const fn bar_bound(p: &Params) -> [i32; 2] {
+    if p.torque_sensor == 0.0 {
+        return [0; 2];
+    }
+    let window_us = 10e6 / p.observer_bandwidth_rad_per_s;
+    let margin_nm = p.wheel_friction_nm + 2.0 * p.wheel_damping_nm_s + 20.0 * p.wheel_inertia_kg_m2;
+    [(window_us + 0.5) as i32, (margin_nm * 1e3 + 0.999) as i32]
+}
+
 impl Monitor {
     /// The monitor's own limits, straight from the SI parameters and past the configuration above.
     #[must_use]
     pub const fn new(p: &Params) -> Self {
+        let [window_us, margin_mnm] = bar_bound(p);
         Self {
             limit_mnm: (p.torque_limit_nm * 1e3 + 0.5) as i32,
             growth_mnm_per_ms: (p.wind_up_nm_per_s + 0.999) as i32,
@@ -36,6 +49,8 @@ impl Monitor {
                 (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
                 (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
             ],
+            window_us,
+            margin_mnm,
         }
     }
 }

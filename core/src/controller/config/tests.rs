@@ -67,11 +67,14 @@ fn each_parameter_reaches_monitor_and_estimator() {
         band_mnm: 364,
         probe_mnm: 124,
         gains_mnm: [750, 10_000, 50, 350],
+        // Without a bar every reading is the hands' own.
+        window_us: 0,
+        margin_mnm: 0,
     };
     assert_eq!(monitor, expected);
     assert_eq!((estimator.phase_per_us, estimator.periods), (9878, 5));
     assert_eq!((estimator.amplitude_nm, estimator.k_nms), (0.123_4, 0.7));
-    assert!((estimator.lag - 1.156_11).abs() < 1e-5);
+    assert!(estimator.arm.re == 1.0 && (estimator.arm.im - 1.156_11).abs() < 1e-5);
     assert!((f64::from(estimator.muscle) - arm_share(&params)).abs() < 1e-6);
 }
 

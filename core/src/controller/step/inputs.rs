@@ -2,9 +2,11 @@
 
 use super::Step;
 use crate::controller::injection::Injection;
-use crate::controller::inputs::{Input, Inputs, Motion};
+use crate::controller::inputs::{ColumnState, Input, Inputs, Motion};
 use crate::controller::memory::ChangedParts;
 use crate::law::probe::ProbeState;
+use crate::observer::{self, Observer, Sensor};
+use crate::quantity::{Radians, Torque};
 use crate::safety::faults::{Fault, FaultSet};
 use crate::safety::modes::Mode;
 use crate::safety::plausibility::LaneMotion;
@@ -17,6 +19,10 @@ impl<I: Injection> Step<'_, I> {
     pub(super) fn update_inputs(&mut self, fast_enough: Option<bool>) -> FaultSet {
         let inputs = self.inputs;
         let mut kept = self.memory.faults();
+        self.hands = match self.sensor {
+            Sensor::Hands => inputs.column.value().map(|column| column.driver_torque),
+            Sensor::Bar(observer) => self.observed_hands(observer),
+        };
         if let Input::New(motion) = &inputs.motion {
             self.update_motion(motion, &mut kept);
         }
@@ -33,10 +39,16 @@ impl<I: Injection> Step<'_, I> {
                 self.changed.add(ChangedParts::INPUT_TIMES);
                 self.changed.add(ChangedParts::COLUMN);
                 // The rim of a free wheel answers the probe too: driver torques are compared where it passes zero.
-                if self.memory.fast.probe.is_passing_zero() {
-                    self.memory.fast.hands.update(column.driver_torque);
+                if let Some(hands) = self.hands.filter(|_| self.memory.fast.probe.is_passing_zero()) {
+                    // How much of its friction a wheel that hardly turns has given, nobody sees.
+                    let unsure = match self.sensor {
+                        Sensor::Hands => Torque::ZERO,
+                        Sensor::Bar(observer) => observer.friction(),
+                    };
+                    self.memory.fast.hands.update(hands, unsure);
                 }
-                self.memory.plausibility.set_wheel_angle(column.wheel_angle);
+                let angle = self.column_angle(column);
+                self.memory.plausibility.set_wheel_angle(angle);
             }
             Input::Held(_) => {}
             Input::Lost => {
@@ -69,6 +81,28 @@ impl<I: Injection> Step<'_, I> {
         }
         self.memory.fast.kept = kept.bits();
         lost_inputs(inputs)
+    }
+
+    /// The hands' torque by the observer, which begins anew after a lost column.
+    #[inline(never)]
+    fn observed_hands(&mut self, observer: &Observer) -> Option<Torque> {
+        self.changed.add(ChangedParts::OBSERVER);
+        let state = &mut self.memory.observer;
+        let Some(column) = self.inputs.column.value() else {
+            *state = observer::State::NEW;
+            return None;
+        };
+        let is_new = matches!(self.inputs.column, Input::New(_));
+        let angle = is_new.then_some(column.wheel_angle);
+        Some(observer.step(state, column.driver_torque, angle))
+    }
+
+    /// The angle of the column, which the road wheels follow.
+    fn column_angle(&self, column: &ColumnState) -> Radians {
+        match self.sensor {
+            Sensor::Hands => column.wheel_angle,
+            Sensor::Bar(observer) => observer.column_angle(column.wheel_angle, column.driver_torque),
+        }
     }
 
     /// Takes speeds and yaw rate that came since the last step: judges them, and what follows from the speed.
@@ -113,11 +147,12 @@ impl<I: Injection> Step<'_, I> {
             passed,
             is_tested,
         );
+        let angle = self.column_angle(&column);
         let plausible = self.config.plausibility.column(
             &mut self.memory.plausibility,
             self.now,
             column.driver_torque,
-            column.wheel_angle,
+            angle,
             self.applied,
         );
         kept.set(!(is_alive && plausible), Fault::ColumnImplausible);

@@ -18,6 +18,7 @@ use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs};
 use crate::lane::LaneSample;
 use crate::law::Law;
+use crate::observer::Sensor;
 use crate::quantity::{Instant, Micros, Torque};
 use crate::safety::faults::{Fault, FaultSet};
 use crate::safety::hands::WARN;
@@ -27,6 +28,7 @@ use crate::safety::modes::Mode;
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
     pub(super) law: Law,
+    pub(super) sensor: Sensor<'a>,
     pub(super) now: Instant,
     pub(super) elapsed: Micros,
     /// The torque that was really applied since the last step.
@@ -37,6 +39,8 @@ pub(super) struct Step<'a, I> {
     pub(super) lane: Input<LaneSample>,
     /// It was old when it arrived.
     pub(super) is_late: bool,
+    /// The hands' torque, as far as the sensor tells it.
+    pub(super) hands: Option<Torque>,
     pub(super) memory: &'a mut Memory,
     pub(super) changed: ChangedParts,
     pub(super) once: &'a mut KeptOnce,
@@ -87,6 +91,7 @@ impl<I: Injection> Step<'_, I> {
             mode,
             faults,
             warning,
+            hands: self.hands,
         }
     }
 

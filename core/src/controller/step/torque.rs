@@ -30,7 +30,7 @@ impl<I: Injection> Step<'_, I> {
             }
         };
         // Without a column the override limit cannot act; the mode is not Active then either.
-        let driver = self.driver().unwrap_or(Torque::ZERO);
+        let driver = self.hands.unwrap_or(Torque::ZERO);
         let situation = Situation {
             applied: self.applied,
             elapsed: self.elapsed,
@@ -56,7 +56,7 @@ impl<I: Injection> Step<'_, I> {
     fn handover(&mut self, faults: FaultSet) -> Torque {
         let demanded = self.guidance();
         let is_plausible = !faults.contains(Fault::ColumnImplausible);
-        let ending = self.ending(pace(self.applied, self.driver(), is_plausible));
+        let ending = self.ending(pace(self.applied, self.hands, is_plausible));
         // While the lane is known, no more than the law demands: a curve may end before the ramp does.
         if self.lane.value().is_some() {
             smaller_of_same_sign(ending, demanded)
@@ -71,10 +71,6 @@ impl<I: Injection> Step<'_, I> {
         self.changed.add(ChangedParts::RAMP);
         // Where the envelope or the driver has brought the torque below its ramp, it does not rise again.
         smaller_of_same_sign(self.memory.ramp.step(passed), self.applied)
-    }
-
-    fn driver(&self) -> Option<Torque> {
-        self.inputs.column.value().map(|column| column.driver_torque)
     }
 
     /// The probe's torque, while it is wanted or on its way out.
@@ -128,7 +124,7 @@ impl<I: Injection> Step<'_, I> {
                     Input::New(column) => Some(Sample {
                         at: self.now,
                         wheel: column.wheel_angle,
-                        torques: [column.driver_torque, asked],
+                        torques: [self.hands.unwrap_or(column.driver_torque), asked],
                     }),
                     Input::Held(_) | Input::Lost => None,
                 };

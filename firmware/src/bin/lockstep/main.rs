@@ -117,14 +117,16 @@ mod target {
     }
 
     impl Product {
-        fn new(found: Found, params: Params, boot: Boot, cells: &Cells) -> Self {
+        /// A function of its own, so that a caller has one product on its stack and not its parts beside it.
+        #[inline(never)]
+        fn new(found: Found, params: &Params, boot: Boot, cells: &Cells) -> Self {
             let origin = Origin {
                 boot,
                 is_image_whole: true,
                 key: Some(BENCH_KEY),
             };
             Self {
-                service: Service::new(found, Some(params), origin, cells),
+                service: Service::new(found, Some(*params), origin, cells),
                 steps: 0,
                 rejected: Rejections::NONE,
                 restart: None,
@@ -192,8 +194,11 @@ mod target {
         /// A function of its own, for the same reason as [`begin`].
         #[inline(never)]
         fn be_product(&mut self, is_one: bool) {
-            self.product =
-                is_one.then(|| Product::new(Found::default(), self.params, Boot::default(), &self.cells));
+            self.product = None;
+            if is_one {
+                let found = Found::default();
+                self.product = Some(Product::new(found, &self.params, Boot::default(), &self.cells));
+            }
         }
 
         fn tick(&mut self, now: Instant, place: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
@@ -280,7 +285,7 @@ mod target {
                 stored,
                 ..Found::default()
             };
-            self.product = Some(Product::new(found, self.params, boot, &self.cells));
+            self.product = Some(Product::new(found, &self.params, boot, &self.cells));
             let start = Start {
                 state: StartState::Boot(boot),
                 at: now,

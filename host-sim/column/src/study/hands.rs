@@ -10,8 +10,9 @@
 
 use std::f64::consts::{PI, TAU};
 
+use haptic_core::controller::config::Config;
+use haptic_core::observer::State;
 use haptic_core::quantity::{Radians, Torque};
-use haptic_observer::{Observer, Reading, Setup, State};
 use haptic_sim::Scenario;
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::nonlinear::WorldParameters;
@@ -23,8 +24,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
-use super::ColumnFile;
-use super::sensors::{Rate, SensorsError, believed};
+use super::sensors::{Rate, SensorsError};
+use super::{ColumnFile, believed, hands_torque};
 
 /// A larger mean torque is that of a hand: it is above the offset of a sensor.
 pub const HELD_NM: f64 = 0.35;
@@ -406,15 +407,10 @@ impl Study {
                     bandwidth,
                     j_w_share,
                 } => {
-                    let mut of = believed(&file.column, rate, bandwidth);
-                    of.j_w *= j_w_share;
-                    let setup = Setup::new(&of).map_err(SensorsError::Setup)?;
-                    Some((
-                        Observer::new(setup),
-                        State::default(),
-                        step_deg.to_radians(),
-                        rate,
-                    ))
+                    let mut of = believed(&file, 1.0 / rate.hz(), bandwidth);
+                    of.wheel_inertia_kg_m2 *= j_w_share;
+                    let config = Config::new(&of).map_err(SensorsError::Setup)?;
+                    Some((config, State::NEW, step_deg.to_radians(), rate))
                 }
             });
         }
@@ -427,12 +423,12 @@ impl Study {
                 for (observer, Second(sums)) in observers.iter_mut().zip(&mut sums) {
                     let says_nm = match observer {
                         None => bar_nm,
-                        Some((observer, state, step_rad, rate)) => {
+                        Some((config, state, step_rad, rate)) => {
                             let sampled = rate.samples(bench.step);
                             let seen = (column_rad / *step_rad).round() * *step_rad;
                             let angle = sampled.then(|| Radians::from_rad(seen));
                             let bar_torque = Torque::from_nm(bar_nm);
-                            observer.step(state, &Reading { bar_torque, angle }).hands.nm()
+                            hands_torque(config, state, bar_torque, angle).nm()
                         }
                     };
                     sums[0] += says_nm;

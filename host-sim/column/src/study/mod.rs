@@ -2,13 +2,19 @@
 //! threads and progress are whose program it is.
 //!
 //! - [`assist`]: overlay or offset, what hands feel of it, margins, what a sudden loss costs.
+//! - [`ecu`]: the ECU behind the bar, where its parameters are right and where they are not.
 //! - [`hands`]: whether a hand is at the wheel, and how soon that is known.
-//! - [`sensors`]: the hands' torque by the observer of `haptic-observer`, by the angle's sensor.
+//! - [`sensors`]: the hands' torque by the observer of core, by the angle's sensor.
 
 pub mod assist;
+pub mod ecu;
 pub mod hands;
 pub mod sensors;
 
+use haptic_core::controller::config::Config;
+use haptic_core::controller::params::Params;
+use haptic_core::observer::{Sensor, State};
+use haptic_core::quantity::{Radians, Torque};
 use haptic_sim::Scenario;
 use haptic_sim::fields::InFile;
 use haptic_sim::models::torsion_bar::{
@@ -85,6 +91,29 @@ impl ColumnFile {
         let mut curves = self.curves();
         let medium = curves.iter().position(|(name, _)| *name == Usual::Medium.name());
         curves.swap_remove(medium.unwrap_or(0))
+    }
+}
+
+/// What an ECU is told of a file's column, whose angle comes every so many seconds.
+fn believed(file: &ColumnFile, column_period_s: f64, observer_bandwidth_rad_per_s: f64) -> Params {
+    let column = &file.column;
+    Params {
+        torque_sensor: 1.0,
+        wheel_inertia_kg_m2: column.j_w_kg_m2,
+        wheel_damping_nm_s: column.b_w_nms_per_rad,
+        wheel_friction_nm: column.upper_friction_nm,
+        bar_stiffness_nm_per_rad: column.k_tb_nm_per_rad,
+        column_period_s,
+        observer_bandwidth_rad_per_s,
+        ..Params::PAPER
+    }
+}
+
+/// What an ECU makes of the bar's torque and, where it is sampled, the angle.
+fn hands_torque(config: &Config, state: &mut State, bar_torque: Torque, angle: Option<Radians>) -> Torque {
+    match config.sensor() {
+        Some(Sensor::Bar(observer)) => observer.step(state, bar_torque, angle),
+        Some(Sensor::Hands) | None => bar_torque,
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a sensor has to deliver: how late and how wrong the observer of `haptic-observer` tells the torque of the hands, by the steps and
+//! What a sensor has to deliver: how late and how wrong the observer of core tells the torque of the hands, by the steps and
 //! the rate of the angle's sensor, the observer's bandwidth, and what is believed of J_w and K_tb.
 //!
 //! The car has the file's assist, or the medium one, and goes at 60 km/h; its angle is the column's. In the first half the hands steer with
@@ -6,15 +6,16 @@
 
 use std::f64::consts::TAU;
 
+use haptic_core::controller::config::{Config, hands_lag_s};
+use haptic_core::controller::params::{ParamError, Params};
+use haptic_core::observer::State;
 use haptic_core::quantity::{Radians, Torque};
-use haptic_observer::{Observer, Parameters, Reading, Setup, SetupError, State};
 use haptic_sim::models::sensors::camera_looks;
-use haptic_sim::models::torsion_bar::ColumnParameters;
 use haptic_sim::parts::{Acting, Vehicle};
 use haptic_sim::scenario::ScenarioError;
 use serde::Serialize;
 
-use super::{ColumnFile, rms};
+use super::{ColumnFile, believed, ecu, hands_torque, rms};
 
 /// Steps of the angle's sensor, degrees.
 pub const STEPS_DEG: [f64; 3] = [0.005, 0.02, 0.1];
@@ -89,6 +90,8 @@ pub struct Results {
     pub bar_no_hand_nm: f64,
     /// By step, rate and bandwidth.
     pub rows: Vec<Row>,
+    /// The ECU behind the bar, by what it believes of it.
+    pub ecu: Vec<ecu::Row>,
 }
 
 impl Results {
@@ -116,7 +119,7 @@ pub enum SensorsError {
     Scenario(#[from] ScenarioError),
     /// A column that the observer cannot be set up for.
     #[error("the observer: {0}")]
-    Setup(SetupError),
+    Setup(ParamError),
 }
 
 /// What was seen in a millisecond.
@@ -153,36 +156,19 @@ fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ScenarioError> 
     Ok(seen)
 }
 
-/// An observer's parameters, all known, for an angle of the column.
-pub(super) fn believed(column: &ColumnParameters, rate: Rate, bandwidth: f64) -> Parameters {
-    Parameters {
-        j_w: column.j_w_kg_m2,
-        b_w: column.b_w_nms_per_rad,
-        friction_nm: column.upper_friction_nm,
-        friction_give_rad: column.friction_give_rad,
-        k_tb: column.k_tb_nm_per_rad,
-        sample_ms: 1000.0 / rate.hz(),
-        bandwidth,
-        ..Parameters::default()
-    }
-}
-
 /// What an observer says of a record, less the hands' torque of its lag ago: root of the mean square, N.m.
-fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
-    let observer = Observer::new(Setup::new(of).map_err(SensorsError::Setup)?);
-    let (mut state, step_rad) = (State::default(), step_deg.to_radians());
-    let lag = f64::from(observer.setup().lag_us()) * 1e-3;
+fn deviation(of: &Params, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
+    let config = Config::new(of).map_err(SensorsError::Setup)?;
+    let (mut state, step_rad) = (State::NEW, step_deg.to_radians());
+    let lag = 1e3 * hands_lag_s(of);
     let (whole, rest) = (lag.floor() as usize, lag.fract());
     let errors = seen.iter().enumerate().map(|(k, now)| {
         let is_sampled = rate.samples(k as u32);
         let angle = is_sampled.then(|| Radians::from_rad((now.column_rad / step_rad).round() * step_rad));
         let bar_torque = Torque::from_nm(now.bar_nm);
-        let found = observer
-            .step(&mut state, &Reading { bar_torque, angle })
-            .hands
-            .nm();
+        let found = hands_torque(&config, &mut state, bar_torque, angle);
         let ago = |steps: usize| k.checked_sub(steps).map_or(0.0, |at| seen[at].hands_nm);
-        found - ((1.0 - rest) * ago(whole) + rest * ago(whole + 1))
+        found.nm() - ((1.0 - rest) * ago(whole) + rest * ago(whole + 1))
     });
     let errors: Vec<f64> = errors.collect();
     Ok(rms(errors.into_iter().skip(SETTLES)))
@@ -194,32 +180,31 @@ fn deviation(of: &Parameters, seen: &[Seen], step_deg: f64, rate: Rate) -> Resul
 /// A column that cannot be.
 pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
     let [held, free] = [record(file, true)?, record(file, false)?];
-    let column = &file.column;
     let mut rows = Vec::new();
     for rate in RATES {
         for step_deg in STEPS_DEG {
             for bandwidth in BANDWIDTHS.into_iter().filter(|w| *w <= rate.hz()) {
-                let right = believed(column, rate, bandwidth);
-                let error = |of: Parameters| deviation(&of, &held, step_deg, rate);
-                let wrong = |change: &dyn Fn(f64) -> Parameters, by: f64| {
+                let right = believed(file, 1.0 / rate.hz(), bandwidth);
+                let error = |of: Params| deviation(&of, &held, step_deg, rate);
+                let wrong = |change: &dyn Fn(f64) -> Params, by: f64| {
                     Ok::<_, SensorsError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
                 };
                 rows.push(Row {
                     step_deg,
                     rate,
                     bandwidth,
-                    lag_ms: 1e-3 * f64::from(Setup::new(&right).map_err(SensorsError::Setup)?.lag_us()),
+                    lag_ms: 1e3 * hands_lag_s(&right),
                     error_nm: error(right)?,
                     wrong_j_w_nm: wrong(
-                        &|share| Parameters {
-                            j_w: share * right.j_w,
+                        &|share| Params {
+                            wheel_inertia_kg_m2: share * right.wheel_inertia_kg_m2,
                             ..right
                         },
                         WRONG_J_W,
                     )?,
                     wrong_k_tb_nm: wrong(
-                        &|share| Parameters {
-                            k_tb: share * right.k_tb,
+                        &|share| Params {
+                            bar_stiffness_nm_per_rad: share * right.bar_stiffness_nm_per_rad,
                             ..right
                         },
                         WRONG_K_TB,
@@ -235,5 +220,6 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
         bar_alone_nm: bar(&held),
         bar_no_hand_nm: bar(&free),
         rows,
+        ecu: ecu::run(file)?,
     })
 }

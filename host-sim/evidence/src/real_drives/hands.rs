@@ -55,7 +55,7 @@ impl Felt {
                 let (mut hands, mut last_s) = (HandsState::NEW, time_s[0]);
                 for (k, torque) in driver_nm.iter().enumerate() {
                     hands.add_guided_time(ACTS, Micros::from_us(1));
-                    hands.update(Torque::from_nm(torque / factor(threshold)));
+                    hands.update(Torque::from_nm(torque / factor(threshold)), Torque::ZERO);
                     if part == 1 && threshold == OWN {
                         found.longest_s = found.longest_s.max(time_s[k] - last_s);
                     }

@@ -6,7 +6,7 @@ use haptic_column::study::assist::{
     Column, DRIVEN_KMH, Felt, Group, GroupRow, LoopRow, Results, Spread, WORKING_NM,
 };
 use haptic_column::study::hands::{self, Eye, Hand, Row, Scene};
-use haptic_column::study::sensors;
+use haptic_column::study::{ecu, sensors};
 use haptic_sim::models::torsion_bar::Inject;
 
 /// What stands beside every result: what is not part of it.
@@ -157,6 +157,35 @@ fn drivers_table(rows: &[GroupRow]) -> Table {
     Table::of_rows(caption, rows.iter().map(row))
 }
 
+fn ecu_table(rows: &[ecu::Row]) -> Table {
+    let seconds = |s: Option<f64>| s.map_or(Cell::text("none"), |s| Cell::number(s, 1));
+    let row = |row: &ecu::Row| {
+        let found: Vec<String> = row
+            .found
+            .iter()
+            .map(|(fault, s)| format!("{fault}, {s:.2} s"))
+            .collect();
+        [
+            ("Its parameters say", Cell::text(row.believed)),
+            ("No hand (s)", seconds(row.warned_s)),
+            ("With the probe (s)", seconds(row.warned_beside_probe_s)),
+            ("Resting hands (s)", seconds(row.falsely_warned_s)),
+            (
+                "Yields (ms)",
+                row.yields_ms
+                    .map_or(Cell::text("none"), |ms| Cell::number(f64::from(ms), 0)),
+            ),
+            ("Found", Cell::Text(found.join("; "))),
+        ]
+    };
+    let caption = format!(
+        "A banked straight at 60 km/h, the column every 2 ms: when the driver is warned of hands off, without a hand and with hands that rest \
+         on the wheel; after what time half of the guidance is away when hands push with {} N.m; what else the ECU finds, in each of these",
+        ecu::PUSH_NM
+    );
+    Table::of_rows(caption, rows.iter().map(row))
+}
+
 /// The document of the sensors.
 pub fn sensors_report(results: &sensors::Results) -> Report {
     let row = |row: &sensors::Row| {
@@ -185,6 +214,10 @@ pub fn sensors_report(results: &sensors::Results) -> Report {
             ],
         ),
         Section::new(
+            "The ECU behind the bar",
+            vec![Block::Table(ecu_table(&results.ecu))],
+        ),
+        Section::new(
             "All",
             vec![Block::Table(Table::of_rows(all, results.rows.iter().map(row)))],
         ),
@@ -195,7 +228,7 @@ pub fn sensors_report(results: &sensors::Results) -> Report {
         sensors::HANDS_NM,
         results.curve
     );
-    let note = "The ECU does not use the observer yet. One pattern of hands, a smooth road, no bumps; the angle has no noise but its steps.";
+    let note = "One pattern of hands, a smooth road, no bumps; the angle has no noise but its steps.";
     Report {
         notes: vec![note.into()],
         ..Report::new("The hands' torque through a torsion bar", summary, sections)

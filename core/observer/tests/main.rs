@@ -1,4 +1,0 @@
-//! Tests of the observer, one file per theme.
-
-mod limits;
-mod oracle;

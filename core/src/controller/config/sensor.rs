@@ -1,0 +1,123 @@
+//! The sensor of the column: which one, and for a bar the gains of the observer that makes the hands' torque of it.
+
+use fixed::types::{I0F32, I2F30, I8F24, I16F16};
+
+use super::first_error;
+use crate::controller::params::{ParamError, Params, in_range};
+use crate::estimator::QUIET;
+use crate::observer::{Observer, SensorWords};
+use crate::quantity::Torque;
+
+/// How far the wheel gives before it slides, rad: usual practice, as in the plant of `host-sim/column`.
+const GIVE_RAD: f64 = 0.0035;
+/// [`Estimator::quiet`](crate::estimator::Estimator) with a bar: what the observer says of a free wheel beside the probe.
+const QUIET_BEHIND_A_BAR: Torque = Torque::from_nm(0.1);
+const SAMPLES: &str = "observer_bandwidth_rad_per_s * column_period_s";
+const LOWER_DAMPING: &str = "vehicle.column_damping_nm_s - wheel_damping_nm_s";
+
+/// Refuses, for a bar, an observer that is quicker than its samples and a wheel that damps more than wheel and column together.
+pub(super) const fn check(p: &Params) -> Result<(), ParamError> {
+    if p.torque_sensor == 0.0 {
+        return Ok(());
+    }
+    let per_sample = p.observer_bandwidth_rad_per_s * p.column_period_s;
+    first_error(&[
+        in_range(SAMPLES, per_sample, [0.0, 1.0], "rad"),
+        in_range(LOWER_DAMPING, lower_damping(p), [0.0, 10.0], "N.m.s/rad"),
+    ])
+}
+
+/// B_c of a column whose wheel is apart, and otherwise B_s.
+pub(super) const fn lower_damping(p: &Params) -> f64 {
+    let all = p.vehicle.column_damping_nm_s;
+    if p.torque_sensor == 0.0 {
+        all
+    } else {
+        all - p.wheel_damping_nm_s
+    }
+}
+
+/// The sensor of parameters that are in range.
+pub(super) const fn sensor(p: &Params) -> SensorWords {
+    if p.torque_sensor == 0.0 {
+        return SensorWords::HANDS;
+    }
+    let twist = I0F32::from_bits(scaled(1.0 / p.bar_stiffness_nm_per_rad, 32));
+    let (to_wheel, to_column) = if p.torque_sensor == 1.0 {
+        (twist, I0F32::ZERO)
+    } else {
+        (I0F32::ZERO, twist)
+    };
+    let (inertia, period_s) = (p.wheel_inertia_kg_m2, p.column_period_s);
+    let pole = decay(p.observer_bandwidth_rad_per_s * period_s);
+    let left = 1.0 - pole;
+    let to_rate = 1.5e-3 * left * left * (1.0 + pole) / period_s;
+    let to_torque = inertia * left * left * left / (period_s * period_s);
+    SensorWords::bar(Observer {
+        to_wheel,
+        to_column,
+        by_torque: I0F32::from_bits(scaled(1e-6 / inertia, 32)),
+        damping: I16F16::from_bits(scaled(p.wheel_damping_nm_s * 1000.0, 16)),
+        gives: I16F16::from_bits(scaled(1.0 / GIVE_RAD, 16)),
+        friction: I8F24::from_bits(scaled(p.wheel_friction_nm, 24)),
+        to_angle: I2F30::from_bits(scaled(1.0 - pole * pole * pole, 30)),
+        to_rate: I8F24::from_bits(scaled(to_rate, 24)),
+        to_torque: I16F16::from_bits(scaled(to_torque, 16)),
+    })
+}
+
+/// `(1 + j*turns*t_nms)` at an angular frequency, and with a bar its product with what undoes the lags of the observer there.
+pub(super) const fn arm(p: &Params, turns: f64) -> [f64; 2] {
+    let [each, half_sample] = if p.torque_sensor == 0.0 {
+        [0.0; 2]
+    } else {
+        [
+            turns / p.observer_bandwidth_rad_per_s,
+            0.5 * turns * (p.column_period_s - 1e-3),
+        ]
+    };
+    let lags = [turns * p.t_nms_s, each, each, each, half_sample];
+    let (mut arm, mut i) = ([1.0, 0.0], 0);
+    while i < lags.len() {
+        let [re, im] = arm;
+        arm = [re - im * lags[i], im + re * lags[i]];
+        i += 1;
+    }
+    arm
+}
+
+/// Within which band T_d says that nobody holds the wheel.
+pub(super) const fn quiet(p: &Params) -> Torque {
+    if p.torque_sensor == 0.0 {
+        QUIET
+    } else {
+        QUIET_BEHIND_A_BAR
+    }
+}
+
+/// How far what is known of the hands is behind a torque that changes slowly, s: nothing with a sensor of theirs; with a bar three lags
+/// of the observer, and half of what a sample of the angle is old on average beyond the millisecond.
+#[must_use]
+pub const fn hands_lag_s(p: &Params) -> f64 {
+    if p.torque_sensor == 0.0 {
+        0.0
+    } else {
+        3.0 / p.observer_bandwidth_rad_per_s + 0.5 * (p.column_period_s - 1e-3)
+    }
+}
+
+/// e^-x for 0 to 1, by its series: the error is below 1e-12. `core` has no exponential.
+const fn decay(x: f64) -> f64 {
+    let (mut sum, mut term, mut n) = (1.0, 1.0, 1);
+    while n < 16 {
+        term *= -x / n as f64;
+        sum += term;
+        n += 1;
+    }
+    sum
+}
+
+/// `value * 2^bits`, to the nearest; saturates.
+const fn scaled(value: f64, bits: u32) -> i32 {
+    (value * (1_u64 << bits) as f64 + 0.5) as i32
+}

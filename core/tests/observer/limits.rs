@@ -1,0 +1,175 @@
+//! Every limit on both sides and from both sides, extremes, and what is refused.
+
+use haptic_core::controller::config::{Config, hands_lag_s};
+use haptic_core::controller::params::Params;
+use haptic_core::observer::{Sensor, State};
+use haptic_core::quantity::{Radians, Torque};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+use super::{AT_COLUMN, AT_WHEEL, observer};
+
+/// A jump begins anew with the wheel at rest, so that the hands are what the bar says; a smaller one is taken for a turn.
+#[test]
+fn a_jump_of_the_angle_begins_anew_and_a_smaller_one_does_not() {
+    for side in [1.0, -1.0] {
+        for (jump, is_anew) in [(0.999, false), (1.001, true)] {
+            let observer = observer(&AT_WHEEL);
+            let mut state = State::NEW;
+            let mut step = |angle: f64| {
+                let bar = Torque::from_nm(side * 0.5);
+                observer
+                    .step(&mut state, bar, Some(Radians::from_rad(angle)))
+                    .nm()
+            };
+            assert_eq!(step(0.0), side * 0.5);
+            let after = step(side * jump);
+            assert_eq!(after == side * 0.5, is_anew, "{side} {jump} {after}");
+        }
+    }
+}
+
+/// The bar as the only known torque, before the first sample, up to the most that hands can do.
+#[test]
+fn hands_are_held_within_what_they_can_do() {
+    for side in [1.0, -1.0] {
+        for (bar_nm, expected_nm) in [(19.99, 19.99), (20.01, 20.0)] {
+            let mut state = State::NEW;
+            let hands = observer(&AT_WHEEL).step(&mut state, Torque::from_nm(side * bar_nm), None);
+            assert!((hands.nm() - side * expected_nm).abs() < 1e-6, "{hands:?}");
+        }
+    }
+}
+
+/// A free fall of the wheel: 10 N.m at 0.044 kg.m2 reach 100 rad/s in 440 ms, with no sample that says otherwise. What damps
+/// the wheel shows the rate.
+#[test]
+fn the_rate_is_held_where_no_wheel_turns() {
+    for side in [1.0, -1.0] {
+        let observer = observer(&Params {
+            wheel_damping_nm_s: 0.05,
+            ..AT_WHEEL
+        });
+        let mut state = State::NEW;
+        let _ = observer.step(&mut state, Torque::from_nm(side * 10.0), Some(Radians::ZERO));
+        // The hands' torque stays what the bar's was; a bar of 0 leaves all of it to the wheel.
+        let mut felt = |steps: u32| {
+            let mut last = Torque::ZERO;
+            for _ in 0..steps {
+                last = observer.step(&mut state, Torque::ZERO, None);
+            }
+            side * last.nm()
+        };
+        assert!((felt(400) - (10.0 + 0.05 * 10.0 / 0.044 * 0.4)).abs() < 0.02);
+        assert!((felt(200) - 15.0).abs() < 1e-3);
+        assert!((felt(200) - 15.0).abs() < 1e-3);
+    }
+}
+
+/// Overflow checks are on in this build: nothing wraps, whatever comes, and the estimate keeps within its limits.
+#[test]
+fn no_reading_makes_it_wrap() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(45);
+    let extremes = [
+        f64::MIN,
+        -128.0,
+        -20.0,
+        -1.0,
+        -1e-7,
+        0.0,
+        1e-7,
+        1.0,
+        20.0,
+        127.9,
+        f64::MAX,
+    ];
+    let heavy = Params {
+        wheel_inertia_kg_m2: 0.5,
+        bar_stiffness_nm_per_rad: 5.0,
+        observer_bandwidth_rad_per_s: 400.0,
+        ..AT_COLUMN
+    };
+    let light = Params {
+        wheel_inertia_kg_m2: 0.005,
+        wheel_damping_nm_s: 5.0,
+        wheel_friction_nm: 5.0,
+        torque_sensor: 2.0,
+        ..heavy
+    };
+    let slow = Params {
+        wheel_inertia_kg_m2: 0.005,
+        column_period_s: 0.02,
+        observer_bandwidth_rad_per_s: 5.0,
+        ..AT_COLUMN
+    };
+    for mut of in [heavy, light, slow] {
+        of.vehicle.column_damping_nm_s = 5.0;
+        let (observer, mut state) = (observer(&of), State::NEW);
+        for _ in 0..200_000 {
+            let [bar, angle] = [(); 2].map(|()| match random.random_range(0..3) {
+                0 => extremes[random.random_range(0..extremes.len())],
+                1 => random.random_range(-128.0..128.0),
+                _ => random.random_range(-1.0..1.0),
+            });
+            let angle = random.random_bool(0.7).then(|| Radians::from_rad(angle));
+            let hands = observer.step(&mut state, Torque::from_nm(bar), angle);
+            assert!(hands.nm().abs() <= 20.0);
+        }
+    }
+}
+
+#[test]
+fn a_sensor_that_cannot_be_is_refused_by_name_value_and_range() {
+    let refused = |of: &Params| {
+        Config::new(of)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+            .err()
+    };
+    for (sensor, says) in [
+        (0.5, "torque_sensor = 0.5 is not a whole number from 0 to 2"),
+        (3.0, "torque_sensor = 3 is not a whole number from 0 to 2"),
+        (-1.0, "torque_sensor = -1 is not a whole number from 0 to 2"),
+        (f64::NAN, "torque_sensor = NaN is not a whole number from 0 to 2"),
+    ] {
+        let of = Params {
+            torque_sensor: sensor,
+            ..Params::PAPER
+        };
+        assert_eq!(refused(&of).as_deref(), Some(says));
+    }
+    // 125 rad/s at 8 ms; B_w of B_s.
+    let [samples, lower] =
+        [(125.0, 0.008), (125.1, 0.008)].map(|(observer_bandwidth_rad_per_s, column_period_s)| Params {
+            observer_bandwidth_rad_per_s,
+            column_period_s,
+            ..AT_COLUMN
+        });
+    assert_eq!(refused(&samples), None);
+    let says = refused(&lower).unwrap();
+    assert!(
+        says.starts_with("observer_bandwidth_rad_per_s * column_period_s = 1.00")
+            && says.ends_with("[0, 1] rad"),
+        "{says}"
+    );
+    for (wheel_damping_nm_s, says) in [
+        (0.5, None),
+        (
+            0.75,
+            Some("vehicle.column_damping_nm_s - wheel_damping_nm_s = -0.25 is outside [0, 10] N.m.s/rad"),
+        ),
+    ] {
+        let mut of = Params {
+            wheel_damping_nm_s,
+            ..AT_COLUMN
+        };
+        of.vehicle.column_damping_nm_s = 0.5;
+        assert_eq!(refused(&of).as_deref(), says);
+        // Without a bar neither counts.
+        of.torque_sensor = 0.0;
+        of.column_period_s = 0.02;
+        assert_eq!(refused(&of), None);
+        assert_eq!(Config::new(&of).unwrap().sensor(), Some(Sensor::Hands));
+        assert_eq!(hands_lag_s(&of), 0.0);
+    }
+}
