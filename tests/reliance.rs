@@ -20,14 +20,14 @@ fn all_participants_are_read_live() {
     };
     let found = study(&plan, &Watch::nobody()).unwrap();
     assert_eq!(found.diverged, 0);
-    for (after_s, largest_rms) in [(10.0, 0.085), (30.0, 0.05)] {
+    for (after_s, largest_rms) in [(10.0, 0.1), (30.0, 0.075)] {
         let pooled = found.pooled.iter().find(|a| a.after_s == after_s).unwrap();
         assert_eq!(pooled.count, 14 * 2 * 4);
         assert!(
             pooled.bias.abs() <= 0.02 && pooled.rms <= largest_rms,
             "{pooled:?}"
         );
-        // With the very arm that is assumed; the deviation is wider than the noise, for other arms.
+        // The arm is the one that is assumed, which the ECU does not know.
         assert!(pooled.coverage >= 0.90, "{pooled:?}");
     }
     // After the driver has become another.
@@ -56,11 +56,11 @@ fn the_probe_is_off_by_default() {
     assert_eq!(torque(0.0), torque(0.2));
 }
 
-/// Drivers whose arm is another than the ECU assumes: the error that this makes is inside the deviation that the ECU
-/// states, at both ends of the range, and the deviation is no excuse: it stays below 0.6.
+/// Drivers whose arm is another than the ECU assumes, at both ends of the range: their answer tells most of it, and the
+/// deviation says what is left. Without that the error is 0.18 and 0.16, with a deviation of 0.28 and 0.17.
 #[test]
-fn another_arm_is_inside_the_stated_deviation() {
-    for t_nms_s in [0.06, 0.15] {
+fn another_arm_is_told() {
+    for (t_nms_s, largest_rms) in [(0.06, 0.06), (0.15, 0.115)] {
         let plan = ReliancePlan {
             participants: (1..=14).collect(),
             seeds: 1,
@@ -69,17 +69,11 @@ fn another_arm_is_inside_the_stated_deviation() {
             t_nms_s,
         };
         let found = study(&plan, &Watch::nobody()).unwrap();
-        for participant in &found.participants {
-            let late = participant.accuracy.iter().find(|a| a.after_s == 40.0).unwrap();
-            // The mean of four sessions has half of a session's noise.
-            assert!(
-                late.bias.abs() <= 1.3 * late.deviation,
-                "{t_nms_s} s: {participant:?}"
-            );
-            assert!(late.deviation < 0.6, "{participant:?}");
-        }
         let pooled = found.pooled.iter().find(|a| a.after_s == 40.0).unwrap();
-        assert!(pooled.coverage >= 0.95 && pooled.within_one >= 0.68, "{pooled:?}");
+        assert!(pooled.rms <= largest_rms, "{t_nms_s} s: {pooled:?}");
+        assert!(pooled.deviation <= 0.08, "{t_nms_s} s: {pooled:?}");
+        // 0.15 s is 1.7 deviations of the prior away.
+        assert!(pooled.coverage >= 0.75, "{t_nms_s} s: {pooled:?}");
     }
 }
 

@@ -115,11 +115,13 @@ async function handovers() {
 async function probe() {
   await visit("probe");
   await slide("c-k_hg", 0.8);
-  const { now } = page.results().now;
-  check("step 6", Math.abs(now.k_hg - 0.8) < 2 * now.deviation && said().includes(`${now.k_hg.toFixed(1)} ± ${now.deviation.toFixed(1)}`), said());
+  const { now } = page.results().now, digits = now.deviation >= 0.095 ? 1 : 2;
+  check("step 6", Math.abs(now.k_hg - 0.8) < 2 * now.deviation && said().includes(`${now.k_hg.toFixed(digits)} ± ${now.deviation.toFixed(digits)}`), said());
+  const resists = said();
+  await slide("c-k_hg", 0.5);
   const either = said();
   await slide("c-k_hg", 0);
-  check("what the ECU can tell", either.includes("cannot tell") && said().includes("relies on the guidance more than not") && /after 15 s, .* after 60 s/.test(said()), said());
+  check("what the ECU can tell", resists.includes("resists the guidance more than not") && either.includes("cannot tell") && said().includes("relies on the guidance more than not") && /after 15 s, .* after 60 s/.test(said()), said());
   await slide("c-k_hg", 0.8);
   // The same scenario as the command line, by the page's own words.
   const settings = { t_p: 0.3, k_d: 2.4, k_hg: 0.2, remnant: 0.1, probe: true, fail: "input", at: 72.5 };

@@ -32,7 +32,6 @@ async function engine(bytes, law = () => 0) {
     channel: name => numbers(wasm.channel(CHANNEL[name])),
     metrics: (from_m, to_m) => JSON.parse(ask(wasm.metrics(from_m, to_m))),
     peakIfLost: (what, lasts_s) => wasm.peak_if_lost(+(what === "input"), lasts_s),
-    armShare: () => wasm.arm_share(),
     csv: () => ask(wasm.csv()),
     fourteen: () => JSON.parse(ask(wasm.fourteen())),
     laws: () => JSON.parse(ask(wasm.laws())),

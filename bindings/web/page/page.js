@@ -76,8 +76,7 @@ function lineOf({ drive, channel, name, kind, scale = 1, truth, peaks, of }, x) 
   if (peaks) return results[peaks]?.peaks ? { x: results[peaks].peaks.at, y: results[peaks].peaks[of], name, kind } : null;
   const found = results[drive]?.channels;
   if (!found) return null;
-  const times = typeof scale === "function" ? scale(results[drive]) : scale;
-  return { x: found.time, y: times === 1 ? found[channel] : found[channel].map(value => value * times), name, kind };
+  return { x: found.time, y: scale === 1 ? found[channel] : found[channel].map(value => value * scale), name, kind };
 }
 function bandOf({ drive, channel, band, kind }) {
   const found = results[drive]?.channels;

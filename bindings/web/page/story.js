@@ -140,18 +140,16 @@ const STEPS = {
   probe: s => ({
     drives: { now: { t_p: 0.3, ...onLine(s.k_hg), probe: true, remnant: 0.1, course: "bends" } }, plays: "now", whole: true, starts: 8, rate: 3, needle: s.k_hg, asks: { k_hg: s.k_hg.toFixed(2) },
     panels: [panel("c_k_hg", "0 to 1", [{ truth: s.k_hg, name: t("truth"), kind: "manual" }, { drive: "now", channel: "k_hg", name: t("told"), kind: "now", band: "deviation" }], { y: [-0.1, 1.6] }),
-      panel("c_sure", "of K_hg", [{ drive: "now", channel: "deviation", name: t("sure_whole"), kind: "now" }, { drive: "now", channel: "k_hg", scale: result => result.arm_share, name: t("sure_arm"), kind: "manual" }], { y: [0, 0.6] }),
+      panel("c_sure", "of K_hg", [{ drive: "now", channel: "deviation", name: t("sure_whole"), kind: "now" }], { y: [0, 0.2] }),
       panel("c_tremble", "N.m", [{ drive: "now", channel: "guidance", name: t("guidance_torque"), kind: "guidance" }, { drive: "now", channel: "driver", name: t("driver_torque"), kind: "driver" }], { x: [14, 18] })],
     controls: [{ ...RESISTS, label: "k_hg_true" }],
     right: ({ now }) => Number.isFinite(now.now.k_hg) ? tellsOf(now.now) : "either",
     says: ({ now: result }) => {
-      const { now, channels, arm_share } = result;
+      const { now, channels } = result;
       if (!Number.isFinite(now.k_hg)) return t("said_probe_none");
       const heard = PHASES_S.map(at => [at, channels.k_hg[200 * at], channels.deviation[200 * at]]).filter(([, k_hg]) => Number.isFinite(k_hg));
-      const arm = arm_share * Math.abs(now.k_hg), noise = Math.max(0, now.deviation - arm);
       const phases = heard.map(([at, k_hg, deviation]) => t("said_phase", { at, told: sure(k_hg, deviation) })).join(", ");
-      return [t("said_probe", { phases, told: sure(now.k_hg, now.deviation), truth: f2(s.k_hg) }), t(`tells_${tellsOf(now)}`),
-        t(arm > noise ? "sure_by_arm" : "sure_by_noise", { noise: f2(noise), arm: f2(arm) })].join(" ");
+      return [t("said_probe", { phases, told: sure(now.k_hg, now.deviation), truth: f2(s.k_hg) }), t(`tells_${tellsOf(now)}`)].join(" ");
     },
   }),
   compare: s => {

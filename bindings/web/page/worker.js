@@ -57,7 +57,7 @@ async function run(job) {
     if (made % 20000 === 0) await new Promise(done => setTimeout(done));
     if (!jobs.includes(job)) return null;
   }
-  const result = { key: job.key, channels: {}, road: lab.road(2), now: lab.now(), metrics: lab.metrics(...job.window), arm_share: lab.armShare(), odd, fault };
+  const result = { key: job.key, channels: {}, road: lab.road(2), now: lab.now(), metrics: lab.metrics(...job.window), odd, fault };
   for (const name of Object.keys(CHANNEL)) result.channels[name] = lab.channel(name);
   if (job.csv) result.csv = lab.csv();
   return result;

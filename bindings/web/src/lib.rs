@@ -180,12 +180,6 @@ pub extern "C" fn peak_if_lost(lane: u32, lasts_s: f64) -> f64 {
     peak_m.unwrap_or(f64::NAN)
 }
 
-/// The share of K_hg by which the ECU's estimate may be wrong because it does not know the driver's arm; NaN without a run.
-#[unsafe(no_mangle)]
-pub extern "C" fn arm_share() -> f64 {
-    lab().run.as_ref().map_or(f64::NAN, Run::arm_share)
-}
-
 /// Where the numbers of this instant stand.
 #[unsafe(no_mangle)]
 pub extern "C" fn now() -> *const f64 {

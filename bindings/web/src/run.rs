@@ -2,7 +2,6 @@
 
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
-use haptic_core::controller::config::arm_share;
 use haptic_log::trace::{CHANNELS, Sample, Trace};
 use haptic_metrics::{self as metrics, Circumstances, Metrics, Window, measure};
 use haptic_sim::guidance::{AnyGuidance, Guidance, OwnLaw};
@@ -104,11 +103,6 @@ impl Run {
             Loop::Shipping(simulation) => peak_of_fork_m(simulation, failure, lasts_s),
             Loop::Law(simulation) => peak_of_fork_m(simulation, failure, lasts_s),
         }
-    }
-
-    /// The share of K_hg by which the ECU's estimate may be wrong because it does not know the driver's arm.
-    pub(crate) fn arm_share(&self) -> f64 {
-        arm_share(&self.scenario.guidance().controller)
     }
 
     /// What a run is judged by, as the command line has it: over a stretch of road, with its failure.

@@ -15,7 +15,7 @@ mod monitor;
 mod sensor;
 
 use crate::controller::params::{DRIVER_ACTIVITY, LAWS, ParamError, Params, SENSORS, in_range, whole};
-use crate::estimator::{BLOCK_S, Complex, Estimator, T_NMS_RANGE_S};
+use crate::estimator::{BLOCK_S, Complex, Estimator, T_NMS_SD_S};
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::law::{Coefficients, Law, LawWords};
@@ -233,7 +233,8 @@ impl Estimator {
     #[must_use]
     const fn new(p: &Params) -> Self {
         let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
-        let [re, im] = sensor::arm(p, turns);
+        let [re, im] = sensor::arm(p, turns, p.t_nms_s);
+        let [slower_re, slower_im] = sensor::arm(p, turns, p.t_nms_s + T_NMS_SD_S);
         Self {
             phase_per_us: phase_per_us(p.probe_frequency_hz),
             periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,
@@ -242,37 +243,14 @@ impl Estimator {
                 re: re as f32,
                 im: im as f32,
             },
+            slower: Complex {
+                re: (slower_re - re) as f32,
+                im: (slower_im - im) as f32,
+            },
             k_nms: p.k_nms as f32,
-            muscle: arm_share(p) as f32,
             quiet: sensor::quiet(p),
         }
     }
-}
-
-/// The part of the deviation reported with K_hg that is no noise, as a share of K_hg: the largest error that an arm with another
-/// t_nms of [`T_NMS_RANGE_S`] makes.
-#[must_use]
-pub const fn arm_share(p: &Params) -> f64 {
-    let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
-    // T_d = -K T_h/(1 + j x) read with another lag y is K (1 + x y)/(1 + x^2): off by x (x - y)/(1 + x y) of itself.
-    let assumed = turns * p.t_nms_s;
-    let [shortest, longest] = [turns * T_NMS_RANGE_S[0], turns * T_NMS_RANGE_S[1]];
-    let [below, above] = [
-        shortest * (shortest - assumed) / (1.0 + shortest * assumed),
-        longest * (longest - assumed) / (1.0 + longest * assumed),
-    ];
-    // Between them it is largest where y x^2 + 2 x = y, and is x^2 there. Newton's method from y/2, above the root.
-    let (mut lag, mut steps) = (0.5 * assumed, 0);
-    while steps < 6 {
-        lag = assumed * (1.0 + lag * lag) / (2.0 * (1.0 + lag * assumed));
-        steps += 1;
-    }
-    let between = if lag > shortest && lag < longest {
-        lag * lag
-    } else {
-        0.0
-    };
-    below.abs().max(above.abs()).max(between)
 }
 
 #[cfg(test)]

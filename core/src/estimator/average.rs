@@ -10,7 +10,7 @@
 use heapless::Deque;
 use micromath::F32Ext;
 
-use super::Reading;
+use super::{Complex, Reading};
 use crate::quantity::Ratio;
 
 /// The work that is left for the last block.
@@ -18,31 +18,47 @@ use crate::quantity::Ratio;
 pub(super) enum Work {
     Nothing,
     /// Take a reading into the average.
-    Average(f32),
+    Average(Answer),
     /// Test for a change before the last `length` readings, whose sum is `sum`; `best` is the most significant change
     /// so far.
     Compare {
         length: u8,
-        sum: f32,
+        sum: Answer,
         best: Change,
     },
     /// Drop the readings before the change, if it is significant, and report.
     Conclude(Change),
 }
 
-/// A possible change: its significance, which is above 1 for a real one, and the mean and the number of the readings
+/// What a block tells of the driver, or the mean or the sum of several.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Answer {
+    /// K_hg with the assumed t_nms; noise and another t_nms make it complex.
+    pub(super) k_hg: Complex,
+    /// By how much it is more with a t_nms that is larger by one deviation of the prior.
+    pub(super) slower: Complex,
+}
+
+impl Answer {
+    fn add(&mut self, weight: f32, other: &Self) {
+        self.k_hg.add(weight, other.k_hg);
+        self.slower.add(weight, other.slower);
+    }
+}
+
+/// A possible change: its significance, which is above 1 for a real one, and the sum and the number of the readings
 /// after it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Change {
     significance: f32,
-    mean: f32,
+    sum: Answer,
     count: u8,
 }
 
 /// The average of the readings so far.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Average {
-    mean: f32,
+    mean: Answer,
     /// Readings in the mean, at most [`MEMORY`].
     count: u8,
     /// Weighted sum of squared innovations, and the sum of the weights.
@@ -50,7 +66,7 @@ pub(super) struct Average {
     weights: f32,
     /// Readings since the start, at most [`FIRST_REPORT`].
     total: u8,
-    recent: Deque<f32, LONGEST>,
+    recent: Deque<Answer, LONGEST>,
 }
 
 /// Memory of the average in readings (40 s).
@@ -88,7 +104,7 @@ impl Average {
     pub(super) fn new(amplitude_nm: f32) -> Self {
         let scale = PRIOR_NM / amplitude_nm;
         Self {
-            mean: 0.0,
+            mean: Answer::default(),
             count: 0,
             squares: PRIOR_WEIGHT * PRIOR_VARIANCE * scale * scale,
             weights: PRIOR_WEIGHT,
@@ -97,17 +113,18 @@ impl Average {
         }
     }
 
-    pub(super) fn take(&mut self, reading: f32) {
+    pub(super) fn take(&mut self, reading: Answer) {
         if self.recent.is_full() {
             self.recent.pop_front();
         }
         // There is room, as the oldest was removed.
         let _ = self.recent.push_back(reading);
         let count = f32::from(self.count);
-        let innovation = reading - self.mean;
+        let mut innovation = reading;
+        innovation.add(-1.0, &self.mean);
         if self.count > 0 {
             // Corrected for the variance of the mean itself.
-            let square = innovation * innovation * count / (count + 1.0);
+            let square = innovation.k_hg.re * innovation.k_hg.re * count / (count + 1.0);
             let square = square.min(OUTLIER * self.variance());
             let kept = 1.0 - 1.0 / SPREAD_MEMORY;
             self.squares = self.squares * kept + square;
@@ -115,7 +132,7 @@ impl Average {
         }
         self.count = self.count.saturating_add(1).min(MEMORY);
         self.total = self.total.saturating_add(1).min(FIRST_REPORT);
-        self.mean += innovation / f32::from(self.count);
+        self.mean.add(1.0 / f32::from(self.count), &innovation);
     }
 
     /// Variance of one reading.
@@ -124,18 +141,17 @@ impl Average {
     }
 
     /// Counts one more reading to those after a possible change, and tests how significant that change is.
-    pub(super) fn compare(&self, length: u8, sum: f32, best: Change) -> Work {
+    pub(super) fn compare(&self, length: u8, mut sum: Answer, best: Change) -> Work {
         let next = self.recent.iter().rev().nth(usize::from(length));
         let length = length.saturating_add(1);
         let before = self.count.saturating_sub(length);
         let (Some(next), true) = (next, before >= SHORTEST) else {
             return Work::Conclude(best);
         };
-        let sum = sum + next;
+        sum.add(1.0, next);
         let (new, old) = (f32::from(length), f32::from(before));
-        let mean = sum / new;
-        let mean_before = (f32::from(self.count) * self.mean - sum) / old;
-        let difference = mean - mean_before;
+        let mean_before = (f32::from(self.count) * self.mean.k_hg.re - sum.k_hg.re) / old;
+        let difference = sum.k_hg.re / new - mean_before;
         let variance = OVERLAP_DIFFERENCE * self.variance() * (1.0 / new + 1.0 / old);
         let least = if length < FEW { CHANGE_OF_FEW } else { CHANGE };
         let significance = difference * difference / (variance * least);
@@ -143,7 +159,7 @@ impl Average {
         let best = if better {
             Change {
                 significance,
-                mean,
+                sum,
                 count: length,
             }
         } else {
@@ -152,16 +168,21 @@ impl Average {
         Work::Compare { length, sum, best }
     }
 
-    /// Reports the estimate. `muscle` is the share of K_hg by which it may be wrong because of the arm's t_nms.
-    pub(super) fn conclude(&mut self, change: Change, muscle: f32) -> Option<Reading> {
+    /// Reports the estimate: the mean with the most probable t_nms.
+    pub(super) fn conclude(&mut self, change: Change) -> Option<Reading> {
         if change.significance > 1.0 {
-            (self.mean, self.count) = (change.mean, change.count);
+            (self.mean, self.count) = (Answer::default(), change.count);
+            self.mean.add(1.0 / f32::from(change.count), &change.sum);
         }
-        let variance = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR;
-        // The error of the arm is not noise, so it is added to the deviation, not to the variance.
-        let deviation = root(variance) + muscle * self.mean.abs();
+        let Answer { k_hg, slower } = self.mean;
+        let noise = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR;
+        // With the arm's own t_nms, larger by u deviations, the mean is k_hg + u*slower, whose imaginary part is noise alone. So
+        // u is `by`, with the variance `left` that remains of the prior's 1.
+        let square = noise + slower.im * slower.im;
+        let (by, left) = (-k_hg.im * slower.im / square, noise / square);
+        let deviation = root(noise + slower.re * slower.re * left);
         (self.total >= FIRST_REPORT).then(|| Reading {
-            k_hg: Ratio::from_f32(self.mean),
+            k_hg: Ratio::from_f32(k_hg.re + by * slower.re),
             deviation: Ratio::from_f32(deviation),
         })
     }

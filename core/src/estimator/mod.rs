@@ -3,26 +3,20 @@
 //! At the probe's frequency the driver's eyes and the vehicle's movement hardly matter, so equation (8) becomes
 //! `K_hg = -((1 + j*w*t_nms)*T_d + K_nms*phi)/T_h`, where each symbol is the Fourier coefficient of the measured or
 //! applied signal. The coefficients are taken over *blocks*: Hann windows of a whole number of probe periods, about 2
-//! s long, each overlapping the last by half. The real part of the ratio over one block is one noisy *reading* of
-//! K_hg.
+//! s long, each overlapping the last by half. The ratio over one block is one noisy *reading* of K_hg.
 //!
 //! The estimate is the average of all readings since the start or since the last change, with a memory of about 40
 //! readings. A *change* is declared when the mean of the last 3 to 14 readings differs too much from the mean before
 //! them (a generalised likelihood ratio); the readings before it are then dropped. The spread of the readings, which
 //! comes from the driver's own noise, is estimated with a prior, and gives the standard deviation of the estimate.
 //!
-//! | figure, pooled over 14 drivers with 0.1 N.m of noise, 0.2 N.m at 2.5 Hz | after 10 s | after 30 s |
-//! |---|---|---|
-//! | bias | -0.002 | -0.003 |
-//! | RMS error | 0.072 | 0.043 |
-//! | share within 1.96 deviations | 0.95 | 0.95 |
+//! How right it is: docs/explanation/live-estimate.md.
 //!
-//! (`cargo xtask reliance` makes this table; `tests/reliance.rs` asserts a part of it.)
+//! K_nms of the driver's arm is assumed, and so is a t_nms, give or take 0.03 s. With the arm's own t_nms the ratio
+//! is real but for noise; with the assumed one it is off by `j*w*(t_nms - assumed)*T_d/T_h`. So the imaginary part of the
+//! average tells t_nms, and that corrects the real part. What is not told of t_nms is in the deviation.
 //!
-//! K_nms and t_nms of the driver's arm are assumed. An arm with another t_nms, 0.06 to 0.15 s, causes an error in
-//! proportion to K_hg; the reported deviation is that of the noise plus the largest such error. So it is large for
-//! drivers who resist the guidance: 0.39 of K_hg at 2.5 Hz. (An identification from a whole recording estimates t_nms
-//! too.) A driver who relies fully on the guidance, K_hg 0, is distinguished from hands off by T_d: where T_d stays
+//! A driver who relies fully on the guidance, K_hg 0, is distinguished from hands off by T_d: where T_d stays
 //! within 0.012 N.m for half a block, nobody holds the wheel, and there is no reading.
 //!
 //! The estimate is advisory and outside the torque path. It is computed in f32 with additions, multiplications and
@@ -45,7 +39,7 @@ pub(crate) mod background;
 
 use crate::law::sine::{QUARTER, sine};
 use crate::quantity::{Instant, Radians, Ratio, Torque};
-use average::{Average, Change, Work};
+use average::{Answer, Average, Change, Work};
 
 /// What the estimator knows of the probe and the driver's arm; immutable.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,16 +52,16 @@ pub struct Estimator {
     pub(crate) amplitude_nm: f32,
     /// What makes of the measured T_d that of the arm in front of its muscles: `1 + j*w*t_nms`, times the lags of an observer.
     pub(crate) arm: Complex,
+    /// What `arm` is more if t_nms is larger by [`T_NMS_SD_S`].
+    pub(crate) slower: Complex,
     /// K_nms, N.m/rad.
     pub(crate) k_nms: f32,
-    /// Largest error of K_hg, as a share of it, that another t_nms of [`T_NMS_RANGE_S`] makes.
-    pub(crate) muscle: f32,
     /// If T_d stays within this band for half a block, nobody holds the wheel.
     pub(crate) quiet: Torque,
 }
 
-/// The range of t_nms of drivers' arms, s. The reported deviation covers the error that any of them causes.
-pub const T_NMS_RANGE_S: [f64; 2] = [0.06, 0.15];
+/// Standard deviation of t_nms over drivers' arms, s: they have 0.06 to 0.15 s.
+pub(crate) const T_NMS_SD_S: f64 = 0.03;
 
 /// [`Estimator::quiet`] with a sensor of the hands' torque: 0.012 N.m, one digit of it up and down.
 pub(crate) const QUIET: Torque = Torque::from_bits(201_327);
@@ -140,6 +134,13 @@ impl Complex {
     fn add(&mut self, weight: f32, term: Self) {
         self.re += weight * term.re;
         self.im += weight * term.im;
+    }
+
+    fn times(self, other: Self) -> Self {
+        Self {
+            re: self.re * other.re - self.im * other.im,
+            im: self.re * other.im + self.im * other.re,
+        }
     }
 }
 
@@ -215,13 +216,13 @@ impl Estimator {
                 state.average.take(reading);
                 Work::Compare {
                     length: 0,
-                    sum: 0.0,
+                    sum: Answer::default(),
                     best: Change::default(),
                 }
             }
             Work::Compare { length, sum, best } => state.average.compare(length, sum, best),
             Work::Conclude(change) => {
-                state.reading = state.average.conclude(change, self.muscle);
+                state.reading = state.average.conclude(change);
                 Work::Nothing
             }
         };
@@ -269,20 +270,24 @@ impl Estimator {
     }
 
     /// The reading of a block, if enough of the probe was applied in it.
-    fn reading(&self, block: &Block) -> Option<f32> {
-        let Block {
-            driver,
-            wheel,
-            applied,
-            ..
-        } = block;
-        let arm = &self.arm;
-        let re = arm.re * driver.re - arm.im * driver.im + self.k_nms * wheel.re;
-        let im = arm.re * driver.im + arm.im * driver.re + self.k_nms * wheel.im;
+    fn reading(&self, block: &Block) -> Option<Answer> {
+        let applied = block.applied;
         let power = applied.re * applied.re + applied.im * applied.im;
         // The coefficient of a sine is half its amplitude times the sum of the window's weights.
         let least = LEAST_SHARE * 0.5 * self.amplitude_nm * block.weight;
-        ((power > 0.0) & (power >= least * least)).then(|| -(re * applied.re + im * applied.im) / power)
+        ((power > 0.0) & (power >= least * least)).then(|| {
+            // -1/T_h.
+            let per_applied = Complex {
+                re: -applied.re / power,
+                im: applied.im / power,
+            };
+            let mut right = self.arm.times(block.driver);
+            right.add(self.k_nms, block.wheel);
+            Answer {
+                k_hg: right.times(per_applied),
+                slower: self.slower.times(block.driver).times(per_applied),
+            }
+        })
     }
 }
 

@@ -40,9 +40,12 @@ pub(crate) fn block_us(params: &Params) -> f64 {
     (2.0 * params.probe_frequency_hz).round() * 1e6 / frequency_hz(params)
 }
 
+/// A reading, and by how much it is more if t_nms is larger by 0.03 s.
+type Reading = [Phasor; 2];
+
 /// The readings since hands were last on the wheel, averaged.
 struct Readings {
-    all: Vec<f64>,
+    all: Vec<Reading>,
     /// How many of them came since the last change.
     since_change: usize,
     /// Squared innovations, one for each reading but the first.
@@ -61,12 +64,15 @@ impl Readings {
     }
 
     /// The mean since the change, and how many readings it counts for: beyond 40 the old ones fade.
-    fn mean(&self) -> (f64, f64) {
+    fn mean(&self) -> (Reading, f64) {
         let since = &self.all[self.all.len() - self.since_change..];
-        since.iter().fold((0.0, 0.0), |(mean, count), reading| {
-            let count = f64::min(count + 1.0, 40.0);
-            (mean + (reading - mean) / count, count)
-        })
+        let mut count = 0.0;
+        let mean = since.iter().fold(Reading::default(), |mean, reading| {
+            count = f64::min(count + 1.0, 40.0);
+            let new = |i: usize, j: usize| mean[i][j] + (reading[i][j] - mean[i][j]) / count;
+            [0, 1].map(|i| [0, 1].map(|j| new(i, j)))
+        });
+        (mean, count)
     }
 
     /// Each square counts 59/60 of the one after it; the prior is worth eight before the first.
@@ -81,20 +87,23 @@ impl Readings {
         sum / weights
     }
 
-    fn take(&mut self, reading: f64, seen: &mut Seen) {
-        let (mean, count) = self.mean();
+    fn take(&mut self, reading: Reading, seen: &mut Seen) {
+        let ([[mean, _], _], count) = self.mean();
         if count > 0.0 {
-            let square = (reading - mean).powi(2) * count / (count + 1.0);
+            let square = (reading[0][0] - mean).powi(2) * count / (count + 1.0);
             let most = 9.0 * self.variance();
             seen.outliers += usize::from(square > most);
             self.squares.push(square.min(most));
         }
         self.all.push(reading);
         self.since_change += 1;
-        let (mean, count) = self.mean();
+        let ([[mean, _], _], count) = self.mean();
         let supposed = (3..=14_usize).filter(|new| *new as f64 + 3.0 <= count);
         let significance = |new: usize| {
-            let sum: f64 = self.all[self.all.len() - new..].iter().sum();
+            let sum: f64 = self.all[self.all.len() - new..]
+                .iter()
+                .map(|[[re, _], _]| re)
+                .sum();
             let (new, before) = (new as f64, count - new as f64);
             let apart = sum / new - (count * mean - sum) / before;
             let deviation = (1.25 * self.variance() * (1.0 / new + 1.0 / before)).sqrt();
@@ -108,10 +117,14 @@ impl Readings {
     }
 
     /// The report, after five readings.
-    fn estimate(&self, share: f64) -> Estimate {
-        let (mean, count) = self.mean();
-        let noise = (1.2 * self.variance() / count + 0.02_f64.powi(2)).sqrt();
-        (self.all.len() >= 5).then_some([mean, noise + share * mean.abs()])
+    fn estimate(&self) -> Estimate {
+        let ([[re, im], more], count) = self.mean();
+        let noise = 1.2 * self.variance() / count + 0.02_f64.powi(2);
+        // The real part of the mean is K_hg - u*more[0], its imaginary part -u*more[1], each with the noise, and u is 0 +- 1.
+        let left = 1.0 / (1.0 + more[1].powi(2) / noise);
+        let u = -left * more[1] * im / noise;
+        let deviation = (noise + left * more[0].powi(2)).sqrt();
+        (self.all.len() >= 5).then_some([re + u * more[0], deviation])
     }
 }
 
@@ -127,18 +140,8 @@ pub(crate) struct Seen {
     pub(crate) quiet: usize,
 }
 
-/// The largest error of K_hg, as a share of what is read, that another arm makes: what is read of an arm with x = w*t_nms,
-/// as if it had y, is K_hg times the real part of (1 + jy)/(1 + jx).
-pub(crate) fn share(params: &Params) -> f64 {
-    let w = TAU * params.probe_frequency_hz;
-    let of = |t_nms_s: f64| 1.0 / over([1.0, w * params.t_nms_s], [1.0, w * t_nms_s])[0] - 1.0;
-    (60..=150)
-        .map(|ms| of(1e-3 * f64::from(ms)).abs())
-        .fold(0.0, f64::max)
-}
-
 /// One reading: the ratio of Fourier coefficients under a Hann window that begins at `from_us`.
-fn reading(params: &Params, block: &[Point], from_us: f64) -> Option<f64> {
+fn reading(params: &Params, block: &[Point], from_us: f64) -> Option<Reading> {
     let turns_per_us = 1e-6 * frequency_hz(params);
     let (mut driver, mut wheel, mut applied, mut weights) = ([0.0; 2], [0.0; 2], [0.0; 2], 0.0);
     for point in block {
@@ -157,9 +160,15 @@ fn reading(params: &Params, block: &[Point], from_us: f64) -> Option<f64> {
     }
     // A sine of amplitude a has a coefficient of a/2 times the weights.
     let size = applied[0].hypot(applied[1]) / (0.5 * weights);
-    let arm = times([1.0, TAU * params.probe_frequency_hz * params.t_nms_s], driver);
-    let right = [arm[0] + params.k_nms * wheel[0], arm[1] + params.k_nms * wheel[1]];
-    (size >= 0.5 * params.probe_amplitude_nm).then(|| -over(right, applied)[0])
+    let with = |t_nms_s: f64| {
+        let arm = times([1.0, TAU * params.probe_frequency_hz * t_nms_s], driver);
+        let right = [0, 1].map(|i| -arm[i] - params.k_nms * wheel[i]);
+        over(right, applied)
+    };
+    (size >= 0.5 * params.probe_amplitude_nm).then(|| {
+        let [read, slower] = [with(params.t_nms_s), with(params.t_nms_s + 0.03)];
+        [read, [0, 1].map(|i| slower[i] - read[i])]
+    })
 }
 
 /// What there is to say from which sample on.
@@ -185,7 +194,7 @@ pub(crate) fn expected(params: &Params, points: &[Point], seen: &mut Seen) -> Ve
                 Some(reading) => readings.take(reading, seen),
                 None => seen.faint += 1,
             }
-            said.push((to, readings.estimate(share(params))));
+            said.push((to, readings.estimate()));
         }
         was_quiet = quiet;
     }

@@ -1,8 +1,6 @@
 //! One scenario, simulated and measured.
 
 use haptic_core::bus::Frame;
-use haptic_core::controller::config::arm_share;
-use haptic_core::estimator::T_NMS_RANGE_S;
 use serde::Serialize;
 
 use super::RunRecord;
@@ -15,19 +13,13 @@ use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 use haptic_sim::simulation::{Run, observe, simulate};
 use haptic_sim::unguided::{Unguided, stretches};
 
-/// K_hg as the ECU reports it, and what its deviation is made of.
+/// K_hg as the ECU reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LiveEstimate {
     /// The estimate.
     pub k_hg: f64,
-    /// The deviation that is reported: the sum of the two below.
+    /// Its standard deviation.
     pub deviation: f64,
-    /// Standard deviation of the noise.
-    pub noise: f64,
-    /// Largest error that an arm of another t_nms makes.
-    pub arm: f64,
-    /// Which t_nms, s: from and to.
-    pub t_nms_s: [f64; 2],
 }
 
 /// A scenario with its run.
@@ -118,16 +110,7 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, StudyError
         sensors: scenario.sensors(),
         failure_time_s: scenario.failure().at_s(),
         seed: scenario.seed(),
-        k_hg: k_hg.map(|[k_hg, deviation]| {
-            let arm = arm_share(&scenario.guidance().controller) * k_hg.abs();
-            LiveEstimate {
-                k_hg,
-                deviation,
-                noise: (deviation - arm).max(0.0),
-                arm,
-                t_nms_s: T_NMS_RANGE_S,
-            }
-        }),
+        k_hg: k_hg.map(|[k_hg, deviation]| LiveEstimate { k_hg, deviation }),
         window_m: [window.from_m, window.to_m],
         record,
         notes: failure_notes(scenario.failure().time_s, &[record], window),

@@ -14,8 +14,6 @@ use haptic_core::bus::messages::{
     Column, FaultRecord, Guidance, Info, LanePreview, MESSAGES, Message, Rejection, ResetCause, Telemetry,
     Vehicle, Warning,
 };
-use haptic_core::controller::config::arm_share;
-use haptic_core::controller::params::Params;
 use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::safety::modes::Mode;
@@ -57,12 +55,8 @@ pub struct Status {
     pub probe_nm: Option<f64>,
     /// K_hg; `None` while it is not identified.
     pub k_hg: Option<f64>,
-    /// The deviation that is reported: the sum of the two below.
+    /// Its standard deviation.
     pub k_hg_deviation: Option<f64>,
-    /// Standard deviation of the noise, of an ECU with the paper's arm and probe.
-    pub k_hg_noise: Option<f64>,
-    /// Largest error that an arm of another t_nms makes there.
-    pub k_hg_arm: Option<f64>,
     /// Whether the driver has to take over.
     pub warning: bool,
     /// Every fault that is present.
@@ -243,12 +237,6 @@ impl View {
         self.status.probe_nm = telemetry.probe.map(|torque| torque.nm());
         self.status.k_hg = telemetry.k_hg.map(|reading| reading.k_hg.si());
         self.status.k_hg_deviation = telemetry.k_hg.map(|reading| reading.deviation.si());
-        self.status.k_hg_arm = self
-            .status
-            .k_hg
-            .map(|k_hg| arm_share(&Params::PAPER) * k_hg.abs());
-        let parts = self.status.k_hg_deviation.zip(self.status.k_hg_arm);
-        self.status.k_hg_noise = parts.map(|(deviation, arm)| (deviation - arm).max(0.0));
         if self.identified != telemetry.k_hg.is_some() {
             self.identified = !self.identified;
             changes.push(match self.status.k_hg {

@@ -66,8 +66,8 @@ pub(super) const fn sensor(p: &Params) -> SensorWords {
     })
 }
 
-/// `(1 + j*turns*t_nms)` at an angular frequency, and with a bar its product with what undoes the lags of the observer there.
-pub(super) const fn arm(p: &Params, turns: f64) -> [f64; 2] {
+/// `1 + j*turns*t_nms` at an angular frequency, and with a bar its product with what undoes the lags of the observer there.
+pub(super) const fn arm(p: &Params, turns: f64, t_nms_s: f64) -> [f64; 2] {
     let [each, half_sample] = if p.torque_sensor == 0.0 {
         [0.0; 2]
     } else {
@@ -76,7 +76,7 @@ pub(super) const fn arm(p: &Params, turns: f64) -> [f64; 2] {
             0.5 * turns * (p.column_period_s - 1e-3),
         ]
     };
-    let lags = [turns * p.t_nms_s, each, each, each, half_sample];
+    let lags = [turns * t_nms_s, each, each, each, half_sample];
     let (mut arm, mut i) = ([1.0, 0.0], 0);
     while i < lags.len() {
         let [re, im] = arm;

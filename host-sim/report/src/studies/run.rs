@@ -56,11 +56,8 @@ fn table(results: &SingleResults) -> Table {
     let mut rows: Vec<_> = DEFINITIONS.iter().map(metric).collect();
     if let Some(read) = results.k_hg {
         let name = Cell::text("K_hg, as the ECU reads it");
-        let spread = format!(
-            "+- {:.4}: {:.4} of noise, {:.4} for an arm with a t_nms of {} to {} s",
-            read.deviation, read.noise, read.arm, read.t_nms_s[0], read.t_nms_s[1]
-        );
-        rows.push(vec![name, Cell::number(read.k_hg, 4), Cell::Text(spread)]);
+        let spread = Cell::Text(format!("+- {:.4}", read.deviation));
+        rows.push(vec![name, Cell::number(read.k_hg, 4), spread]);
     }
     Table::new("", ["Metric", "Value", "Unit"], rows)
 }

@@ -222,15 +222,7 @@ impl Screen {
             return Ok(());
         }
         let names = [
-            "time",
-            "mode",
-            "T_h",
-            "limit",
-            "T_d",
-            "wheel",
-            "e_y'",
-            "speed",
-            "K_hg noise arm",
+            "time", "mode", "T_h", "limit", "T_d", "wheel", "e_y'", "speed", "K_hg +-",
         ];
         let units = ["s", "", "N.m", "", "N.m", "deg", "m", "km/h", ""];
         print(&line(names.map(String::from), "faults"))?;
@@ -266,8 +258,8 @@ fn described(status: &Status) -> String {
     let number = |value: Option<f64>, factor: f64, digits: usize| {
         value.map_or("-".into(), |value| format!("{:+.digits$}", value * factor))
     };
-    let k_hg = match (status.k_hg, status.k_hg_noise, status.k_hg_arm) {
-        (Some(k_hg), Some(noise), Some(arm)) => format!("{k_hg:.2} {noise:.2} {arm:.2}"),
+    let k_hg = match (status.k_hg, status.k_hg_deviation) {
+        (Some(k_hg), Some(deviation)) => format!("{k_hg:.2} +- {deviation:.2}"),
         _ => "-".into(),
     };
     let speed = status.speed_m_per_s;
