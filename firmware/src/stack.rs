@@ -9,8 +9,8 @@
 
 use cortex_m::peripheral::{MPU, SCB};
 
-/// Length of the guard, a power of two, as in `stack.x`. More than the largest frame, 2.6 KB.
-const GUARD: u32 = 4096;
+/// Length of the guard, a power of two, as in `stack.x`. More than the largest frame, 4.3 KB, which is a whole ECU on its way to its place.
+const GUARD: u32 = 8192;
 
 /// What untouched stack holds.
 const PAINT: u32 = 0x5AFE_57AC;

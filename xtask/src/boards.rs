@@ -18,9 +18,9 @@ use crate::size;
 use crate::tool::{self, Usage, cargo, run};
 
 /// Length of the guard below the stack (`firmware/src/stack.rs`): a larger frame could step over it.
-const GUARD: u64 = 4096;
+const GUARD: u64 = 8192;
 /// The stack's budget (`firmware/src/stack.x`).
-const STACK: u64 = 12_288;
+const STACK: u64 = 16_384;
 
 /// The clock of an STM32G4, and what an instruction takes there at most in the mean (docs/porting.md).
 const CLOCK_MHZ: u64 = 170;
