@@ -18,7 +18,6 @@ mod target {
     use haptic_firmware::service::Service;
     use haptic_firmware::{host, product};
     use haptic_secoc::verifier::Verifier;
-    use haptic_secoc::verifier::Verifier;
 
     /// The step that breaks.
     const AT: u32 = 500;
