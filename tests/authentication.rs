@@ -161,10 +161,11 @@ impl Bus {
                 torque_limit_nm: 1.0,
                 ..Params::PAPER
             });
-            let field = (ms / 10) as usize % (set.len() + 1);
-            sent.push(match field.checked_sub(1) {
-                None => download::unlock(0, 0),
-                Some(field) => set[field],
+            let turn = (ms / 10) as usize;
+            sent.push(if turn.is_multiple_of(8) {
+                download::unlock(0, 0)
+            } else {
+                set[turn % set.len()]
             });
         }
         if phase == 9 {

@@ -336,8 +336,8 @@ fn a_frame_with_the_crc_of_another_is_no_repetition() {
             let counter = honest.data()[1] & 15;
             let colliding = (0_u32..1 << 16)
                 .map(|bits| {
-                    let mut data = [0; 8];
-                    data[1] = 1 << 4;
+                    // Its first half is that of the honest one: both are compared whole.
+                    let mut data: [u8; 8] = honest.data().try_into().unwrap();
                     data[5..7].copy_from_slice(&bits.to_le_bytes()[..2]);
                     Request::PROTECTION.protect(&mut data, counter);
                     Frame::full(Request::ID, data)

@@ -84,7 +84,7 @@ impl Asked {
         reversals: true,
     };
 
-    /// Those among some definitions.
+    /// What some definitions ask for.
     #[must_use]
     pub fn among(definitions: &[&Definition]) -> Self {
         let any = |part: &str| definitions.iter().any(|d| d.name.contains(part));

@@ -17,6 +17,7 @@ use haptic_core::bus::messages::{
 use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::safety::modes::Mode;
+use haptic_secoc::messages::{OFFER_ID, STATUS_ID};
 use serde::Serialize;
 
 use super::PilError;
@@ -115,7 +116,9 @@ impl View {
         let first_s = *self.first_s.get_or_insert(time_s);
         self.status.time_s = time_s - first_s;
         let Some(info) = MESSAGES.iter().find(|info| info.id == frame.id()) else {
-            self.counts.foreign += 1;
+            // What belongs to proofs is of this bus, and says nothing that is shown here.
+            let is_of_proofs = [STATUS_ID, OFFER_ID].contains(&frame.id());
+            self.counts.foreign += u64::from(!is_of_proofs);
             return Vec::new();
         };
         *self.counts.frames.entry(info.name.into()).or_default() += 1;

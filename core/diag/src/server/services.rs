@@ -19,7 +19,7 @@ const ALL_RECORDS: u8 = 0xFF;
 /// The format of the codes: ISO 14229-1.
 const CODE_FORMAT: u8 = 1;
 /// The layout of stored parameters: `haptic_core::service::stored` begins with it, as tests/server.rs checks.
-pub const STORED_LAYOUT: u32 = 4;
+pub const STORED_LAYOUT: u32 = 5;
 
 impl Server {
     /// 0x22. What is not known is left out, unless nothing is.

@@ -332,7 +332,7 @@ pub(crate) fn of_changed_sensor(
     record: [f64; 2],
     [before, after]: [&Balance; 2],
 ) -> Option<Refutation> {
-    if !before.is_close() || !after.is_close() {
+    if before.explained.min(after.explained) < BALANCE_SEEN {
         return None;
     }
     let moved = |[was, error_was]: [f64; 2], [is, error]: [f64; 2]| {
@@ -354,7 +354,8 @@ pub(crate) fn of_changed_sensor(
             how,
         ));
     }
-    let factor = moved(before.stiffness, after.stiffness)?;
+    let are_close = before.is_close() && after.is_close();
+    let factor = moved(before.stiffness, after.stiffness).filter(|_| are_close)?;
     let how = format!("the column's torque goes to {factor:.3} times that of the same wheel angle");
     Some(refutation(
         "the scale of wheel_angle_rad or driver_torque_nm",

@@ -44,7 +44,7 @@ enum Delivered {
 enum Hands {
     Off,
     Rest,
-    /// With [`PUSH_NM`] against guidance, from [`ACTS_MS`] on.
+    /// Pushes with [`PUSH_NM`] against guidance, from [`ACTS_MS`] on.
     Push,
 }
 
@@ -158,9 +158,9 @@ pub struct Row {
     pub believed: &'static str,
     /// Without a hand: when the driver is warned, s after guidance began; none within 44 s.
     pub warned_s: Option<f64>,
-    /// The same beside the probe.
+    /// Likewise beside the probe.
     pub warned_beside_probe_s: Option<f64>,
-    /// With hands that rest on the wheel, likewise: a warning would be false.
+    /// Likewise where hands rest on the wheel: a warning would be false.
     pub falsely_warned_s: Option<f64>,
     /// Hands that push against guidance have half of it away after so long, ms.
     pub yields_ms: Option<u32>,

@@ -258,7 +258,7 @@ fn what_a_file_may_name_is_a_table_in_markdown() {
     has(law_kinds(), "| Kind | Source | Parameters |");
     has(
         law_kinds(),
-        "| `band` | Petermeijer et al. 2015, 2020 (descriptions) | `outer_m` 0.5 (0 to 2; tuned 0.1 to 0.5), `inner_m` 0.19* (0 to 2), \
+        "| `band` | after Petermeijer et al. 2015, 2020 (descriptions) | `outer_m` 0.5 (0 to 2; tuned 0.1 to 0.5), `inner_m` 0.19* (0 to 2), \
          `k_1` 0.25 (0 to 4; tuned 0.25 to 0.45) |",
     );
     has(
