@@ -44,6 +44,8 @@ pub const DRIVER_ACTIVITY: f64 = 1.0;
 /// The sensors of the column, in the order of the parameter `torque_sensor`: the hands' torque, or that of a bar beside the angle of its
 /// column or of its wheel.
 pub const SENSORS: [&str; 3] = ["hands", "bar_and_column_angle", "bar_and_wheel_angle"];
+/// [`Params::torque_sensor`] of a bar beside the angle of its column.
+pub const BAR_AND_COLUMN_ANGLE: f64 = 1.0;
 
 /// [`ParamError::unit`] of a parameter that has to be a whole number.
 pub const WHOLE: &str = "in whole numbers";
@@ -248,6 +250,12 @@ impl fmt::Display for ParamError {
 impl core::error::Error for ParamError {}
 
 impl Params {
+    /// Whether the column's torque is that of a torsion bar.
+    #[must_use]
+    pub const fn has_bar(&self) -> bool {
+        self.torque_sensor != 0.0
+    }
+
     /// Checks every parameter against its range. The ends of a range are in it, also as the nearest f32, which is what
     /// the bus carries. [`crate::controller::config::Config::new`] checks products of them too.
     ///

@@ -1,6 +1,7 @@
 //! One scenario, simulated and measured.
 
 use haptic_core::bus::Frame;
+use haptic_core::controller::params::SENSORS;
 use serde::Serialize;
 
 use super::RunRecord;
@@ -9,6 +10,7 @@ use crate::error::StudyError;
 use crate::readings::Readings;
 use haptic_log::Event;
 use haptic_sim::ecu_events::{EcuEvents, Said};
+use haptic_sim::models::torsion_bar::AngleSensor;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 use haptic_sim::simulation::{Run, observe, simulate};
 use haptic_sim::unguided::{Unguided, stretches};
@@ -113,7 +115,10 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, StudyError
         k_hg: k_hg.map(|[k_hg, deviation]| LiveEstimate { k_hg, deviation }),
         window_m: [window.from_m, window.to_m],
         record,
-        notes: failure_notes(scenario.failure().time_s, &[record], window),
+        notes: failure_notes(scenario.failure().time_s, &[record], window)
+            .into_iter()
+            .chain(sensor_note(&scenario))
+            .collect(),
     };
     let unguided = stretches(&run.trace).unwrap_or_default();
     Ok(SingleRun {
@@ -126,4 +131,53 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, StudyError
         bus,
         results,
     })
+}
+
+/// Says where the ECU takes the sensor of the column for another than it is: no check of its own may find it.
+fn sensor_note(scenario: &Scenario) -> Option<String> {
+    let column = scenario.column();
+    let is = match (column.has_bar(), column.angle) {
+        (false, _) => SENSORS[0],
+        (true, AngleSensor::Column) => SENSORS[1],
+        (true, AngleSensor::Wheel) => SENSORS[2],
+    };
+    let said = SENSORS[scenario.guidance().controller.torque_sensor as usize];
+    (scenario.condition() != Condition::Manual && said != is).then(|| {
+        format!(
+            "guidance.torque_sensor tells the ECU that the column's sensor is {said}, and it is {is}: override, hands off and the check of \
+             the column go by what it is not"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptic_sim::models::torsion_bar::{ColumnKind, ColumnParameters};
+
+    /// Each of the three sensors beside each of the three that the ECU may be told of: six of nine are told apart, and none by hand.
+    #[test]
+    fn a_sensor_that_the_ecu_takes_for_another_is_told() {
+        let columns = [
+            (ColumnKind::Rigid, AngleSensor::Wheel),
+            (ColumnKind::TorsionBar, AngleSensor::Column),
+            (ColumnKind::TorsionBar, AngleSensor::Wheel),
+        ];
+        for (is, (kind, angle)) in columns.into_iter().enumerate() {
+            for said in 0..3 {
+                let mut guidance = haptic_sim::scenario::GuidanceParameters::default();
+                guidance.controller.torque_sensor = f64::from(said as u32);
+                let column = ColumnParameters {
+                    kind,
+                    angle,
+                    ..ColumnParameters::default()
+                };
+                let builder = Scenario::builder().column(column).guidance(guidance);
+                let scenario = builder.clone().build().unwrap();
+                assert_eq!(sensor_note(&scenario).is_some(), is != said, "{is} {said}");
+                let by_hand = builder.condition(Condition::Manual).build().unwrap();
+                assert_eq!(sensor_note(&by_hand), None);
+            }
+        }
+    }
 }

@@ -149,7 +149,7 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
         (column.has_bar(), Reason::TorsionBar),
         (guided && params.law != 0.0, Reason::AnotherLaw),
-        (guided && params.torque_sensor != 0.0, Reason::BarSensor),
+        (guided && params.has_bar(), Reason::BarSensor),
         (guided && *sensors == Sensors::Exact, Reason::ExactSensors),
         (
             guided && heard_m_per_s < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,

@@ -24,7 +24,7 @@ pub(super) const fn monitor_band_nm(p: &Params) -> f64 {
 /// After ten time constants the observer's three lags leave 0.3 %. Hands that throw a wheel change its speed by 20 rad/s2, to 2 rad/s
 /// within a tenth of a second; so much of the torque goes into its friction, damping and inertia, and not through the bar.
 const fn bar_bound(p: &Params) -> [i32; 2] {
-    if p.torque_sensor == 0.0 {
+    if !p.has_bar() {
         return [0; 2];
     }
     let window_us = 10e6 / p.observer_bandwidth_rad_per_s;

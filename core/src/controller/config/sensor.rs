@@ -3,7 +3,7 @@
 use fixed::types::{I0F32, I2F30, I8F24, I16F16};
 
 use super::first_error;
-use crate::controller::params::{ParamError, Params, in_range};
+use crate::controller::params::{BAR_AND_COLUMN_ANGLE, ParamError, Params, in_range};
 use crate::estimator::QUIET;
 use crate::observer::{Observer, SensorWords};
 use crate::quantity::Torque;
@@ -17,7 +17,7 @@ const LOWER_DAMPING: &str = "vehicle.column_damping_nm_s - wheel_damping_nm_s";
 
 /// Refuses, for a bar, an observer that is quicker than its samples and a wheel that damps more than wheel and column together.
 pub(super) const fn check(p: &Params) -> Result<(), ParamError> {
-    if p.torque_sensor == 0.0 {
+    if !p.has_bar() {
         return Ok(());
     }
     let per_sample = p.observer_bandwidth_rad_per_s * p.column_period_s;
@@ -30,20 +30,20 @@ pub(super) const fn check(p: &Params) -> Result<(), ParamError> {
 /// B_c of a column whose wheel is apart, and otherwise B_s.
 pub(super) const fn lower_damping(p: &Params) -> f64 {
     let all = p.vehicle.column_damping_nm_s;
-    if p.torque_sensor == 0.0 {
-        all
-    } else {
+    if p.has_bar() {
         all - p.wheel_damping_nm_s
+    } else {
+        all
     }
 }
 
 /// The sensor of parameters that are in range.
 pub(super) const fn sensor(p: &Params) -> SensorWords {
-    if p.torque_sensor == 0.0 {
+    if !p.has_bar() {
         return SensorWords::HANDS;
     }
     let twist = I0F32::from_bits(scaled(1.0 / p.bar_stiffness_nm_per_rad, 32));
-    let (to_wheel, to_column) = if p.torque_sensor == 1.0 {
+    let (to_wheel, to_column) = if p.torque_sensor == BAR_AND_COLUMN_ANGLE {
         (twist, I0F32::ZERO)
     } else {
         (I0F32::ZERO, twist)
@@ -68,13 +68,13 @@ pub(super) const fn sensor(p: &Params) -> SensorWords {
 
 /// `1 + j*turns*t_nms` at an angular frequency, and with a bar its product with what undoes the lags of the observer there.
 pub(super) const fn arm(p: &Params, turns: f64, t_nms_s: f64) -> [f64; 2] {
-    let [each, half_sample] = if p.torque_sensor == 0.0 {
-        [0.0; 2]
-    } else {
+    let [each, half_sample] = if p.has_bar() {
         [
             turns / p.observer_bandwidth_rad_per_s,
             0.5 * turns * (p.column_period_s - 1e-3),
         ]
+    } else {
+        [0.0; 2]
     };
     let lags = [turns * t_nms_s, each, each, each, half_sample];
     let (mut arm, mut i) = ([1.0, 0.0], 0);
@@ -88,21 +88,17 @@ pub(super) const fn arm(p: &Params, turns: f64, t_nms_s: f64) -> [f64; 2] {
 
 /// Within which band T_d says that nobody holds the wheel.
 pub(super) const fn quiet(p: &Params) -> Torque {
-    if p.torque_sensor == 0.0 {
-        QUIET
-    } else {
-        QUIET_BEHIND_A_BAR
-    }
+    if p.has_bar() { QUIET_BEHIND_A_BAR } else { QUIET }
 }
 
 /// How far what is known of the hands is behind a torque that changes slowly, s: nothing with a sensor of theirs; with a bar three lags
 /// of the observer, and half of what a sample of the angle is old on average beyond the millisecond.
 #[must_use]
 pub const fn hands_lag_s(p: &Params) -> f64 {
-    if p.torque_sensor == 0.0 {
-        0.0
-    } else {
+    if p.has_bar() {
         3.0 / p.observer_bandwidth_rad_per_s + 0.5 * (p.column_period_s - 1e-3)
+    } else {
+        0.0
     }
 }
 

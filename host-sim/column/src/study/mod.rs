@@ -12,7 +12,7 @@ pub mod hands;
 pub mod sensors;
 
 use haptic_core::controller::config::Config;
-use haptic_core::controller::params::Params;
+use haptic_core::controller::params::{BAR_AND_COLUMN_ANGLE, Params};
 use haptic_core::observer::{Sensor, State};
 use haptic_core::quantity::{Radians, Torque};
 use haptic_sim::Scenario;
@@ -98,7 +98,7 @@ impl ColumnFile {
 fn believed(file: &ColumnFile, column_period_s: f64, observer_bandwidth_rad_per_s: f64) -> Params {
     let column = &file.column;
     Params {
-        torque_sensor: 1.0,
+        torque_sensor: BAR_AND_COLUMN_ANGLE,
         wheel_inertia_kg_m2: column.j_w_kg_m2,
         wheel_damping_nm_s: column.b_w_nms_per_rad,
         wheel_friction_nm: column.upper_friction_nm,

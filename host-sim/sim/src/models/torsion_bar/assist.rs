@@ -79,7 +79,7 @@ impl CurveChoice {
     /// Whether it can be read.
     ///
     /// # Errors
-    /// As [`Curve::check`].
+    /// What [`Curve::check`] finds.
     pub fn check(&self) -> Result<(), ScenarioError> {
         match self {
             Self::Usual(_) => Ok(()),
