@@ -96,17 +96,15 @@ impl ColumnFile {
 
 /// What an ECU is told of a file's column, whose angle comes every so many seconds.
 fn believed(file: &ColumnFile, column_period_s: f64, observer_bandwidth_rad_per_s: f64) -> Params {
-    let column = &file.column;
-    Params {
-        torque_sensor: BAR_AND_COLUMN_ANGLE,
-        wheel_inertia_kg_m2: column.j_w_kg_m2,
-        wheel_damping_nm_s: column.b_w_nms_per_rad,
-        wheel_friction_nm: column.upper_friction_nm,
-        bar_stiffness_nm_per_rad: column.k_tb_nm_per_rad,
+    let mut params = Params {
         column_period_s,
         observer_bandwidth_rad_per_s,
         ..Params::PAPER
-    }
+    };
+    file.column.tell(&mut params);
+    // The studies give the ECU the angle of the column.
+    params.torque_sensor = BAR_AND_COLUMN_ANGLE;
+    params
 }
 
 /// What an ECU makes of the bar's torque and, where it is sampled, the angle.
