@@ -33,6 +33,8 @@ pub(super) const ROWS: &[FaultCase] = rows! {
         [Column(AssistLost)] .only_rules().torque(5.0);
     "assist-runs-away" "the assist turns left with all that its motor may, 60 N.m"
         [Column(AssistRunaway)] .only_rules().torque(5.0);
+    "bar-told-right" "the ECU is told right, beside the rows below; driver opposes with 3 N.m for 0.3 s"
+        [OPPOSED] .only_rules().torque(5.0).told(|_| ());
     "bar-taken-for-hands" "the ECU is told of hands where a bar is; driver opposes with 3 N.m for 0.3 s"
         [OPPOSED] .only_rules().torque(5.0).told(|p| p.torque_sensor = 0.0);
     "wheel-inertia-x0.5" "the ECU is told half of J_w; driver opposes with 3 N.m for 0.3 s"
