@@ -336,7 +336,7 @@ impl World {
         } = self.draw(row, seed, &mut rng);
         let end_ms = onset_ms + row.after_ms;
         let told = |wrong: fn(&mut Params)| {
-            let mut guidance = scenario.guidance().clone();
+            let mut guidance = *scenario.guidance();
             wrong(&mut guidance.controller);
             let told = scenario.to_builder().guidance(guidance).build();
             told.expect("half and twice are in range")

@@ -311,11 +311,7 @@ impl WorldKind {
     }
 
     /// A scenario with its column and assist, if those are not the paper's, and with guidance whose ECU is told of them.
-    pub fn on_its_column(
-        &self,
-        scenario: ScenarioBuilder,
-        mut guidance: GuidanceParameters,
-    ) -> ScenarioBuilder {
+    pub fn on_its_column(&self, scenario: ScenarioBuilder, guidance: GuidanceParameters) -> ScenarioBuilder {
         if !self.has_bar() {
             return scenario.guidance(guidance);
         }
@@ -326,11 +322,11 @@ impl WorldKind {
             angle: AngleSensor::Column,
             ..ColumnParameters::default()
         };
-        column.tell(&mut guidance.controller);
         let assist = AssistParameters {
             curve: CurveChoice::Usual(Usual::Medium),
             ..AssistParameters::default()
         };
+        let guidance = guidance.told_of(&column);
         scenario.column(column).assist(assist).guidance(guidance)
     }
 

@@ -20,7 +20,7 @@ use haptic_sim::fields::InFile;
 use haptic_sim::models::torsion_bar::{
     AssistParameters, BarPlant, ColumnKind, ColumnParameters, CurveChoice, Usual,
 };
-use haptic_sim::scenario::{ScenarioBuilder, ScenarioError};
+use haptic_sim::scenario::{GuidanceParameters, ScenarioBuilder, ScenarioError};
 use serde::Deserialize;
 
 /// A column of one's own, as a file (TOML) has it: the two tables of a scenario. It has a bar whatever its kind says.
@@ -96,15 +96,14 @@ impl ColumnFile {
 
 /// What an ECU is told of a file's column, whose angle comes every so many seconds.
 fn believed(file: &ColumnFile, column_period_s: f64, observer_bandwidth_rad_per_s: f64) -> Params {
-    let mut params = Params {
+    let told = GuidanceParameters::default().told_of(&file.column);
+    Params {
+        // The studies give the ECU the angle of the column.
+        torque_sensor: BAR_AND_COLUMN_ANGLE,
         column_period_s,
         observer_bandwidth_rad_per_s,
-        ..Params::PAPER
-    };
-    file.column.tell(&mut params);
-    // The studies give the ECU the angle of the column.
-    params.torque_sensor = BAR_AND_COLUMN_ANGLE;
-    params
+        ..told.controller
+    }
 }
 
 /// What an ECU makes of the bar's torque and, where it is sampled, the angle.

@@ -1,7 +1,6 @@
 //! What a scenario says of its steering column and of the power assist; where the defaults come from stands in
 //! docs/explanation/torsion-bar.md.
 
-use haptic_core::controller::params::{BAR_AND_COLUMN_ANGLE, BAR_AND_WHEEL_ANGLE, Params};
 use serde::{Deserialize, Serialize};
 
 use super::assist::CurveChoice;
@@ -155,18 +154,6 @@ impl ColumnParameters {
     /// When something fails, if it does, s.
     pub fn fault_at_s(&self) -> Option<f64> {
         (self.fault != ColumnFault::None).then_some(self.fault_time_s)
-    }
-
-    /// Tells an ECU of the bar: what its sensor is, and what wheel and bar are.
-    pub fn tell(&self, params: &mut Params) {
-        params.torque_sensor = match self.angle {
-            AngleSensor::Wheel => BAR_AND_WHEEL_ANGLE,
-            AngleSensor::Column => BAR_AND_COLUMN_ANGLE,
-        };
-        params.wheel_inertia_kg_m2 = self.j_w_kg_m2;
-        params.wheel_damping_nm_s = self.b_w_nms_per_rad;
-        params.wheel_friction_nm = self.upper_friction_nm;
-        params.bar_stiffness_nm_per_rad = self.k_tb_nm_per_rad;
     }
 
     /// Whether there is a bar.
