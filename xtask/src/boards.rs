@@ -62,6 +62,15 @@ impl Board {
         }
     }
 
+    /// Where the page of keys begins; None where QEMU is the board. A test compares it with the memory map.
+    pub(crate) const fn keys_at(self) -> Option<u32> {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => None,
+            Self::NucleoG474re | Self::NucleoG474reSensors => Some(0x0807_D800),
+            Self::SamE54Xpro => Some(0x000F_6000),
+        }
+    }
+
     /// Builds an image. QEMU's is for the bench (`firmware/Cargo.toml`); a board's product is sealed.
     pub(crate) fn build(self, image: Image) -> Result<PathBuf> {
         let elf = image::elf_of(&mut image::build_command(image.bin(), M4F, &self.features()))?;
