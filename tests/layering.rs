@@ -89,7 +89,7 @@ const PACKAGES: Arrows = &[
     ("host-sim/metrics", &["haptic-log"]),
     ("host-sim/vehicle", &["haptic-log"]),
     ("host-sim/analysis", &["haptic-log"]),
-    ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
+    ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-metrics", "haptic-secoc", "haptic-sim", "haptic-vectorised", "haptic-vehicle"]),
     ("host-sim/pil", &["haptic-core", "haptic-diag", "haptic-lockstep", "haptic-secoc"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-column", "haptic-log", "haptic-metrics", "haptic-sim", "haptic-vehicle"]),

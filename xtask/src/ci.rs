@@ -394,6 +394,9 @@ fn fuzz() -> Result<()> {
         .args(["test", "--release", "-p", "haptic-diag", "noise"])
         .env("HAPTIC_FUZZ_INPUTS", "100000000"))?;
     run(cargo()
+        .args(["test", "--release", "-p", "haptic-secoc", "noise"])
+        .env("HAPTIC_FUZZ_INPUTS", "10000000"))?;
+    run(cargo()
         .args("test --release -p haptic-guidance --test fuzz_readers".split(' '))
         .env("HAPTIC_FUZZ_INPUTS", "1000000"))
 }

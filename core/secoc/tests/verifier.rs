@@ -489,3 +489,59 @@ fn somebody_who_speaks_as_the_ecu_is_reported() {
     }
     assert_eq!(refused(&mut verifier), [(0x100, Refusal::Foreign, 2)]);
 }
+
+/// Inputs of a test with noise: `usual`, or HAPTIC_FUZZ_INPUTS of them.
+fn inputs(usual: u64) -> u64 {
+    std::env::var("HAPTIC_FUZZ_INPUTS").map_or(usual, |text| {
+        text.parse().expect("HAPTIC_FUZZ_INPUTS is a number")
+    })
+}
+
+/// Frames of any identifier around those of the list, any length and any bytes, at any time, among them true ones and what was true once;
+/// offers and statuses of anybody's to the senders. What passes was sent by its sender, and no more than once.
+#[test]
+fn noise_passes_nothing_that_is_not_true_and_stops_nobody() {
+    for algorithm in [Algorithm::SipHash, Algorithm::AesCmac] {
+        let mut bus = Bus::new(algorithm);
+        let ids: Vec<u16> = PROVEN
+            .iter()
+            .flat_map(|proven| {
+                let behind = match proven.place {
+                    Place::Behind(id) => id,
+                    Place::Within => proven.info.id,
+                };
+                [proven.info.id, behind, proven.question]
+            })
+            .chain([OFFER, STATUS_ID])
+            .collect();
+        for _ in 0..inputs(300_000) {
+            let random = &mut bus.random;
+            let length = random.random_range(0..=8);
+            let bytes: [u8; 8] = random.random();
+            let id = ids[random.random_range(0..ids.len())];
+            let noise = Frame::new(id, &bytes[..length]).unwrap();
+            match random.random_range(0..20) {
+                // True frames, of any message.
+                0..4 => {
+                    let id = PROVEN[random.random_range(0..PROVEN.len())].info.id;
+                    for frame in bus.send(id) {
+                        bus.come(&frame);
+                    }
+                }
+                4..8 => bus.step(),
+                8 if !bus.heard.is_empty() => {
+                    let old = bus.heard[random.random_range(0..bus.heard.len())];
+                    bus.come(&old);
+                }
+                9 => drop(bus.prover.hear(&noise, || bytes[0].into())),
+                10 => bus.ms = bus.ms.wrapping_add(u32::from(bytes[0]) << bytes[1] % 24),
+                _ => drop(bus.come(&noise)),
+            }
+        }
+        assert_eq!(bus.false_ones, 0, "{algorithm:?}: taken twice, or nobody's");
+        println!("{algorithm:?}: {} of {} taken", bus.taken.len(), bus.sent);
+        for proven in PROVEN {
+            bus.resume(proven.info.id);
+        }
+    }
+}

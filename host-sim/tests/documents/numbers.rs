@@ -141,20 +141,34 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
 #[test]
 fn the_load_of_the_bus_on_its_page_is_what_the_command_prints() {
     let place = place();
-    let mut bus = Command::new(env!("CARGO_BIN_EXE_host-sim"));
-    let (_, out, err) = run(
-        bus.args(["ecu", "bus", "--json"]),
-        place.path(),
-        "host-sim ecu bus",
-    );
-    let load: serde_json::Value = serde_json::from_str(&out).expect(&err);
-    let percent = |name: &str| format!("{:.0} %", 100.0 * load[name].as_f64().unwrap());
-    let sentence = format!(": {}, of {} allowed.", percent("load"), percent("max_load"));
+    let load = |arguments: &[&str]| -> serde_json::Value {
+        let mut bus = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+        let command = bus.args(["ecu", "bus", "--json"]).args(arguments);
+        let (_, out, err) = run(command, place.path(), "host-sim ecu bus");
+        serde_json::from_str(&out).expect(&err)
+    };
+    let (plain, proven) = (load(&[]), load(&["--proofs"]));
+    let percent =
+        |load: &serde_json::Value, name: &str| format!("{:.0} %", 100.0 * load[name].as_f64().unwrap());
+    let sentences = [
+        format!(
+            ": {}, of {} allowed.",
+            percent(&plain, "load"),
+            percent(&plain, "max_load")
+        ),
+        format!(
+            "is {}, and {} while parameters are written in Standby.",
+            percent(&proven, "driving"),
+            percent(&proven, "load")
+        ),
+    ];
     let page = &documents()[Path::new("docs/reference/bus.md")];
-    assert!(
-        page.contains(&sentence),
-        "docs/reference/bus.md should say{sentence}"
-    );
+    for sentence in sentences {
+        assert!(
+            page.contains(&sentence),
+            "docs/reference/bus.md should say{sentence}"
+        );
+    }
 }
 
 /// Peak lateral errors of the slowest driver, in the order of the sentence.

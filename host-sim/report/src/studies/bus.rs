@@ -16,7 +16,9 @@ pub struct Load {
     pub messages: Vec<MessageLoad>,
     /// Load of all messages, from 0 to 1.
     pub load: f64,
-    /// Most that it may be.
+    /// Load while nobody writes parameters, as in all that is not Standby.
+    pub driving: f64,
+    /// Most that this may be.
     pub max_load: f64,
 }
 
@@ -26,6 +28,11 @@ impl Load {
         Self {
             bit_rate: BIT_RATE,
             load: messages.iter().map(|row| row.load).sum(),
+            driving: messages
+                .iter()
+                .filter(|row| !row.in_standby)
+                .map(|row| row.load)
+                .sum(),
             messages,
             max_load: MAX_LOAD,
         }
@@ -34,7 +41,8 @@ impl Load {
     /// The sentence that says what it may be.
     fn judgement(&self) -> String {
         format!(
-            "At most {:.2} % of {:.0} kbit/s.",
+            "While nobody writes parameters: {:.2} %, of at most {:.2} % of {:.0} kbit/s.",
+            100.0 * self.driving,
             100.0 * self.max_load,
             self.bit_rate / 1000.0
         )
@@ -45,7 +53,7 @@ impl Load {
         let share = |load: f64| Cell::number(100.0 * load, 2);
         let row = |row: &MessageLoad| {
             vec![
-                Cell::text(row.message),
+                Cell::Text(row.message.clone()),
                 Cell::Text(format!("{:#05x}", row.id)),
                 Cell::number(row.period_ms, 1),
                 Cell::count(row.bits),
@@ -66,7 +74,7 @@ impl Load {
         let most = self.messages.iter().map(|m| m.load).fold(0.0, f64::max);
         let y = Axis::new("Worst-case share of the bus", "%").within(0.0, 108.0 * most);
         let panel = y.panel([Series::with_mark("", 1, Mark::Stems, points)]);
-        Figure::of_rows(self.messages.iter().map(|row| row.message), [panel])
+        Figure::of_rows(self.messages.iter().map(|row| row.message.as_str()), [panel])
     }
 
     /// The document of the load.

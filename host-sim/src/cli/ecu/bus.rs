@@ -1,7 +1,7 @@
 //! `host-sim ecu bus`: the worst-case load of the CAN bus.
 
 use clap::Args;
-use haptic_batch::bus_load::table;
+use haptic_batch::bus_load::{table, table_with_proofs};
 use haptic_report::studies::bus::Load;
 
 use super::super::results::ResultArguments;
@@ -9,12 +9,19 @@ use super::super::{BadInput, Outcome};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
+    /// With the proofs of an ECU that has keys, and all that belongs to them
+    #[arg(long)]
+    proofs: bool,
     #[command(flatten)]
     results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("ecu bus")?;
-    let load = Load::new(table());
-    output.show(&load.report(), &load, load.load <= load.max_load)
+    let load = Load::new(if arguments.proofs {
+        table_with_proofs()
+    } else {
+        table()
+    });
+    output.show(&load.report(), &load, load.driving <= load.max_load)
 }
