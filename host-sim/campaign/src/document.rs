@@ -20,7 +20,7 @@ pub fn table_of_faults() -> String {
                 row.class,
                 reaction(row),
                 row.torque_nm,
-                row.place
+                place(row)
             ));
         }
         text.push('\n');
@@ -28,6 +28,16 @@ pub fn table_of_faults() -> String {
     text.truncate(text.trim_end().len());
     text.push('\n');
     text
+}
+
+/// On which of host and QEMU, and in which worlds, if not in all.
+fn place(row: &FaultCase) -> String {
+    let worlds = match (row.left_out(false), row.left_out(true)) {
+        (Some(_), _) => ", with a bar",
+        (None, Some(_)) => ", without a bar",
+        (None, None) => "",
+    };
+    format!("{}{worlds}", row.place)
 }
 
 fn reaction(row: &FaultCase) -> String {

@@ -219,7 +219,8 @@ impl Run<'_> {
     /// Every row that runs there, some at a time: they do not depend on each other.
     fn campaign(&self, measurement: &Measurement) -> Result<Campaign> {
         let table = output(command(&self.program.to_string_lossy()).args(["faults", "--list"]))?;
-        let names = rows_of(&table, self.arguments.contains("--target"));
+        let has_bar = self.arguments.contains("--world bar");
+        let names = rows_of(&table, self.arguments.contains("--target"), has_bar);
         ensure!(!names.is_empty(), "{PROGRAM} faults --list has no rows");
         let (mut rows, mut limit) = (Vec::new(), None);
         for (k, some) in names.chunks(AT_ONCE).enumerate() {
@@ -283,12 +284,18 @@ impl Run<'_> {
     }
 }
 
-/// Names of the rows that run on the host, or of those that run in QEMU too.
-fn rows_of(table: &str, on_target: bool) -> Vec<String> {
+/// Names of the rows that run on the host, or of those that run in QEMU too, in a world whose column has a bar or has none.
+fn rows_of(table: &str, on_target: bool, has_bar: bool) -> Vec<String> {
+    let another = if has_bar {
+        ", without a bar"
+    } else {
+        ", with a bar"
+    };
     let row = |line: &str| {
         let name = line.strip_prefix("| `")?.split_once('`')?.0;
-        let runs = line.ends_with("| host, Q |") || (!on_target && line.ends_with("| host |"));
-        runs.then(|| name.to_owned())
+        let place = line.strip_suffix(" |")?.rsplit_once("| ")?.1;
+        let runs = place.starts_with("host, Q") || (!on_target && place.starts_with("host"));
+        (runs && !place.ends_with(another)).then(|| name.to_owned())
     };
     table.lines().filter_map(row).collect()
 }
@@ -349,8 +356,10 @@ mod tests {
 
     #[test]
     fn rows_run_where_the_table_says() {
-        let table = "### Bus\n\n| fault | what | where |\n|---|---|---|\n| `a` | x | host |\n| `b` | x | host, Q |\n| `c` | x | Q |\n";
-        assert_eq!(rows_of(table, false), ["a", "b"]);
-        assert_eq!(rows_of(table, true), ["b"]);
+        let table = "### Bus\n\n| fault | what | where |\n|---|---|---|\n| `a` | x | host |\n| `b` | x | host, Q |\n| `c` | x | Q |\n\
+                     | `d` | x | host, with a bar |\n| `e` | x | host, Q, without a bar |\n";
+        assert_eq!(rows_of(table, false, false), ["a", "b", "e"]);
+        assert_eq!(rows_of(table, false, true), ["a", "b", "d"]);
+        assert_eq!(rows_of(table, true, false), ["b", "e"]);
     }
 }
