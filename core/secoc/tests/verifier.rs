@@ -534,7 +534,7 @@ fn noise_passes_nothing_that_is_not_true_and_stops_nobody() {
                     bus.come(&old);
                 }
                 9 => drop(bus.prover.hear(&noise, || bytes[0].into())),
-                10 => bus.ms = bus.ms.wrapping_add(u32::from(bytes[0]) << bytes[1] % 24),
+                10 => bus.ms = bus.ms.wrapping_add(u32::from(bytes[0]) << (bytes[1] % 24)),
                 _ => drop(bus.come(&noise)),
             }
         }
