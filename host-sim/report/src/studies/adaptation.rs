@@ -3,7 +3,6 @@
 use super::with_interval;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
-use haptic_batch::Mean;
 use haptic_batch::adaptation::{AdaptationResults, Pair, SMALL_GAIN, Seen, SmallGain, swings};
 
 /// How long trust's shares remember (`haptic_sim::drivers`), s.
@@ -93,7 +92,7 @@ fn products(results: &AdaptationResults) -> Table {
             SmallGain::Fails => "no",
             SmallGain::Untold => "not told",
         };
-        let mean = |value: Option<&Mean>| Cell::Text(with_interval(value));
+        let mean = |value: Option<&haptic_batch::Mean>| Cell::Text(with_interval(value));
         let [law, driver] = names(results, pair).map(Cell::text);
         [
             ("Law", law),
