@@ -1,4 +1,4 @@
-//! `host-sim adaptation`: its files and its JSON, the same bytes for any number of threads, and nothing left of a file that is refused.
+//! `host-sim compare` of laws and drivers who adapt: its files and its JSON, the same bytes for any number of threads, and nothing left of a file that is refused.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ fn two_adaptations_leave_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_fi
     let run = |file, threads, place| {
         host_sim(
             folder,
-            &["adaptation", file, "--threads", threads, "--out", place, "--json"],
+            &["compare", file, "--threads", threads, "--out", place, "--json"],
         )
     };
     for threads in ["1", "2"] {

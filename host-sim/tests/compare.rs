@@ -79,3 +79,51 @@ fn a_comparison_leaves_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_file
     );
     assert!(!folder.join("wrong").exists());
 }
+
+/// Each file has the directory of its name, and all are checked before one is driven.
+#[test]
+fn several_files_leave_a_directory_each_and_are_refused_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
+    let one = FILE.split("[tuning]").next().unwrap().to_owned()
+        + "[[law]]\nkind = 'none'\n[[driver]]\nkind = 'paper'\n";
+    let adapting = include_str!("../batch/src/adaptation/short.toml");
+    write("road.toml", "[[segment]]\nlength_m = 200\n");
+    write("one.toml", &one);
+    write("two.toml", &adapting.replace("'short'", "'loops'"));
+    write("same.toml", adapting);
+    write("wrong.toml", &one.replace("seeds = 2", "seeds = 0"));
+    let output = compare(folder, &["one.toml", "two.toml", "--out", "out"]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(folder.join("out/short/drives.csv").exists() && folder.join("out/loops/loops.csv").exists());
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(printed.contains("Laws and drivers: short") && printed.contains("Two adaptations: loops"));
+    let refused = [
+        (
+            "same.toml",
+            None,
+            "one.toml and same.toml: both have the name \"short\"",
+        ),
+        ("wrong.toml", None, "wrong.toml: seeds = 0 is outside 1 to 1000"),
+        (
+            "two.toml",
+            Some("--json"),
+            "--json prints the results of one file",
+        ),
+    ];
+    for (second, option, said) in refused {
+        let output = compare(
+            folder,
+            &[&["one.toml", second, "--out", "none"][..], option.as_slice()].concat(),
+        );
+        assert_eq!(output.status.code(), Some(2));
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(error.contains(said), "{error}");
+        assert!(!folder.join("none").exists());
+    }
+}

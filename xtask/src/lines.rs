@@ -21,7 +21,7 @@ pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("examples", 200),
     ("firmware", 3_020),
     ("firmware/lockstep", 200),
-    ("host-sim", 3_300),
+    ("host-sim", 3_340),
     ("host-sim/analysis", 9_150),
     ("host-sim/batch", 10_000),
     ("host-sim/campaign", 4_150),

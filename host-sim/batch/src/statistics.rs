@@ -150,6 +150,23 @@ impl Mean {
             level,
         })
     }
+
+    /// A figure that is no mean of the draws' own, with Tukey's interval from the figures that are left without each draw in turn; none of
+    /// fewer than two.
+    pub(crate) fn tukey(whole: f64, left: &[f64], level: Confidence) -> Self {
+        let others = left.len() as f64 - 1.0;
+        let pseudo: Vec<f64> = left.iter().map(|left| whole + others * (whole - left)).collect();
+        let centred = |[low, high]: [f64; 2]| {
+            let half = 0.5 * (high - low);
+            [whole - half, whole + half]
+        };
+        let found = Self::new(&pseudo, level).and_then(|found| found.interval);
+        Self {
+            mean: whole,
+            interval: found.map(centred),
+            level,
+        }
+    }
 }
 
 /// How probable a mean as far from zero as that of these values is, where the mean of all is zero: Student's test of pairs, both sides.
@@ -317,6 +334,26 @@ mod tests {
         assert!((Z_95 - Normal::standard().inverse_cdf(0.975)).abs() < 1e-9);
         assert_eq!(Mean::new(&[2.0], Confidence::USUAL).unwrap().interval, None);
         assert_eq!(Mean::new(&[], Confidence::USUAL), None);
+    }
+
+    /// Tukey's interval of a mean is Student's: 1 to 5 have 3 +- 2.776*sqrt(0.5). Of the ratio of the sums 6 and 4 of (1, 2, 3) and (1, 1, 2)
+    /// what is left is 5/3, 4/3 and 3/2, so the pseudo-values are 7/6, 11/6 and 3/2 with a deviation of 1/3: 1.5 +- 4.303/3/sqrt(3).
+    #[test]
+    fn each_draw_is_left_out_in_turn() {
+        let half = |left: &[f64], whole: f64| {
+            let found = Mean::tukey(whole, left, Confidence::USUAL);
+            let [low, high] = found.interval.unwrap();
+            assert!((low + high - 2.0 * whole).abs() < 1e-12);
+            0.5 * (high - low)
+        };
+        let of_mean = half(&[3.5, 3.25, 3.0, 2.75, 2.5], 3.0);
+        assert!((of_mean - 2.776 * 0.5_f64.sqrt()).abs() < 1e-3, "{of_mean}");
+        let of_ratio = half(&[5.0 / 3.0, 4.0 / 3.0, 1.5], 1.5);
+        assert!(
+            (of_ratio - 4.303 / 3.0 / 3.0_f64.sqrt()).abs() < 1e-3,
+            "{of_ratio}"
+        );
+        assert_eq!(Mean::tukey(1.0, &[], Confidence::USUAL).interval, None);
     }
 
     #[test]

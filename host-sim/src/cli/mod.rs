@@ -6,7 +6,6 @@
 //!
 //! What `haptic-evidence` needs too is public. One file per command; their groups in `--help` are in `names`. Not here: anything that a study or a model decides.
 
-mod adaptation;
 mod assist;
 pub mod checkpoint;
 mod compare;
@@ -88,16 +87,12 @@ enum Command {
     Sweep(sweep::Arguments),
     /// Every law against every driver, each law tuned first
     ///
-    /// On roads, at speeds, with seeds and failures.
+    /// On roads, at speeds, with seeds and failures; and laws that adapt with drivers who adapt to them: small gain, equilibria, swings.
     Compare(compare::Arguments),
     /// Gains of the guidance for a population of drivers
     ///
     /// They are judged on held-out drives.
     DesignGuidance(design_guidance::Arguments),
-    /// A law that adapts to a driver who adapts to it
-    ///
-    /// Small gain, equilibria, swings.
-    Adaptation(adaptation::Arguments),
     /// Guidance beside power assist, through a torsion bar
     ///
     /// Overlay or offset: what the hands feel, margins, what a sudden loss costs.
@@ -211,7 +206,6 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Run(arguments) => run::run(arguments),
         Command::Sweep(arguments) => sweep::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
-        Command::Adaptation(arguments) => adaptation::run(arguments),
         Command::Assist(arguments) => assist::run(arguments),
         Command::DriverTorque(arguments) => assist::sensors(arguments),
         Command::DesignGuidance(arguments) => design_guidance::run(arguments),

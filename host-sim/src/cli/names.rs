@@ -13,7 +13,7 @@ const GROUPS: [(&str, &str); 4] = [
     ("The paper", "evaluate experiment"),
     (
         "Drive",
-        "run sweep compare design-guidance adaptation assist driver-torque course stability lab",
+        "run sweep compare design-guidance assist driver-torque course stability lab",
     ),
     ("People", "identify identify-vehicle drivers design study convert"),
     ("The ECU on a bus", "ecu"),

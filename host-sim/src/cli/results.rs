@@ -22,7 +22,7 @@ pub struct ResultArguments {
     pub out: Option<PathBuf>,
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// How sure intervals are.

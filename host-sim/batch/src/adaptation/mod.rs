@@ -115,11 +115,11 @@ pub struct Pair {
     /// The law's map.
     pub map: Vec<LawPoint>,
     /// The largest slope of the law's map, N.m.
-    pub law_slope: f64,
+    pub law_slope: Mean,
     /// The largest slope of the driver's map at gains that the law's map has, 1/(N.m); none where the driver has two equilibria there.
-    pub driver_slope: Option<f64>,
+    pub driver_slope: Option<Mean>,
     /// The product of both slopes.
-    pub product: Option<f64>,
+    pub product: Option<Mean>,
     /// K_hg before the loss, and settled behind it.
     pub k_hg: [Option<Mean>; 2],
     /// K_hg behind the loss, less that under the first law.
@@ -159,10 +159,33 @@ pub struct AdaptationResults {
     pub pairs: Vec<Pair>,
 }
 
+/// What the interval of a product tells of small gain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SmallGain {
+    /// The product is at most [`SMALL_GAIN`].
+    Holds,
+    /// It is above that, and below 1.
+    WithoutMargin,
+    /// It is 1 at least.
+    Fails,
+    /// The driver has two equilibria.
+    TwoEquilibria,
+    /// The interval lies on both sides of a limit, or there is none.
+    Untold,
+}
+
 impl Pair {
-    /// Whether small gain holds with its margin.
-    pub fn holds(&self) -> bool {
-        self.product.is_some_and(|product| product <= SMALL_GAIN)
+    /// What the product tells.
+    pub fn small_gain(&self) -> SmallGain {
+        match self.product.map(|product| (product.mean, product.interval)) {
+            None => SmallGain::TwoEquilibria,
+            // A gain that does not move in any drive.
+            Some((0.0, None)) => SmallGain::Holds,
+            Some((_, Some([_, high]))) if high <= SMALL_GAIN => SmallGain::Holds,
+            Some((_, Some([low, _]))) if low >= 1.0 => SmallGain::Fails,
+            Some((_, Some([low, high]))) if low > SMALL_GAIN && high < 1.0 => SmallGain::WithoutMargin,
+            Some(_) => SmallGain::Untold,
+        }
     }
 }
 
@@ -181,6 +204,14 @@ impl AdaptationResults {
 }
 
 impl<'k> Adaptation<'k> {
+    /// Whether a file has the maps of such a study, right or wrong.
+    pub fn is_in(path: &Path) -> bool {
+        let table = Source::open(path)
+            .ok()
+            .and_then(|(_, text)| text.parse::<toml::Table>().ok());
+        table.is_some_and(|table| table.contains_key("map"))
+    }
+
     /// Reads a file and checks it. The road is found beside it.
     ///
     /// # Errors
@@ -218,7 +249,33 @@ impl<'k> Adaptation<'k> {
     /// As [`haptic_sim::scenario::ScenarioBuilder::build`] for a driver's parameters.
     pub fn run(&self, watch: &Watch<'_>) -> Result<AdaptationResults, StudyError> {
         let driven = each(&self.jobs(), watch, |job| self.driven(job))?;
-        let mut groups = driven.chunks(self.seeds as usize);
+        let (maps, mut pairs) = self.summed(&driven, None);
+        let seeds = (0..self.seeds as usize).filter(|_| self.seeds > 1);
+        let left: Vec<Vec<Pair>> = seeds.map(|seed| self.summed(&driven, Some(seed)).1).collect();
+        for (number, pair) in pairs.iter_mut().enumerate() {
+            let told = |whole: Mean, of: fn(&Pair) -> Option<Mean>| {
+                let left: Option<Vec<f64>> =
+                    left.iter().map(|pairs| Some(of(&pairs[number])?.mean)).collect();
+                Mean::tukey(whole.mean, &left.unwrap_or_default(), self.level)
+            };
+            pair.law_slope = told(pair.law_slope, |pair| Some(pair.law_slope));
+            pair.driver_slope = pair
+                .driver_slope
+                .map(|whole| told(whole, |pair| pair.driver_slope));
+            pair.product = pair.product.map(|whole| told(whole, |pair| pair.product));
+        }
+        Ok(self.results(maps, pairs))
+    }
+
+    /// The drivers' maps and the pairs, of all seeds or without one; slopes and products have no intervals.
+    fn summed(&self, driven: &[Driven], left_out: Option<usize>) -> (Vec<Vec<DriverPoint>>, Vec<Pair>) {
+        let mut groups = driven.chunks(self.seeds as usize).map(|group| -> Vec<&Driven> {
+            let kept = group
+                .iter()
+                .enumerate()
+                .filter(|(seed, _)| Some(*seed) != left_out);
+            kept.map(|(_, drive)| drive).collect()
+        });
         let mut next = || groups.next().unwrap_or_default();
         let window = [self.times.settles_s, self.times.map_s()];
         let mut settled = |value: fn(&Seen) -> f64, ended: &mut u32| {
@@ -247,21 +304,21 @@ impl<'k> Adaptation<'k> {
                 (self.k_hg.iter().map(point).collect(), ended)
             })
             .collect();
-        let loops: Vec<&[Driven]> = self.pairs().map(|_| next()).collect();
+        let loops: Vec<Vec<&Driven>> = self.pairs().map(|_| next()).collect();
         let mut pairs = Vec::new();
         for (((law, driver), (map, ended)), own) in self.pairs().zip(law_maps).zip(&loops) {
             pairs.push(Pair {
                 law,
                 driver,
                 ended: ended + own.iter().filter(|drive| drive.ended).count() as u32,
-                ..self.pair(own, loops[driver], &maps[driver], map)
+                ..self.pair(own, &loops[driver], &maps[driver], map)
             });
         }
-        Ok(self.results(maps, pairs))
+        (maps, pairs)
     }
 
     /// A law with a driver, of the drives of their loop and of those under the first law.
-    fn pair(&self, own: &[Driven], first: &[Driven], driver: &[DriverPoint], map: Vec<LawPoint>) -> Pair {
+    fn pair(&self, own: &[&Driven], first: &[&Driven], driver: &[DriverPoint], map: Vec<LawPoint>) -> Pair {
         let Times {
             lost_at_s,
             settles_s,
@@ -281,6 +338,7 @@ impl<'k> Adaptation<'k> {
                 [low.min(p.1), high.max(p.1)]
             });
         let driver_slope = driver_slope(driver, reach);
+        let alone = |figure: f64| Mean::tukey(figure, &[], self.level);
         let swings: Vec<_> = (own.iter())
             .map(|drive| of_series(&drive.within([settles_s, lost_at_s], |seen| seen.k_1)))
             .collect();
@@ -289,13 +347,12 @@ impl<'k> Adaptation<'k> {
             law: 0,
             driver: 0,
             map,
-            law_slope,
-            driver_slope,
+            law_slope: alone(law_slope),
+            driver_slope: driver_slope.map(alone),
             // A gain that does not move has no loop.
-            product: if law_slope == 0.0 {
-                Some(0.0)
-            } else {
-                driver_slope.map(|slope| slope * law_slope)
+            product: match law_slope {
+                0.0 => Some(alone(0.0)),
+                _ => driver_slope.map(|slope| alone(slope * law_slope)),
             },
             k_hg: [before, behind].map(|window| self.mean_of(own.iter().map(|drive| k_hg(drive, window)))),
             against_first: self.mean_of(

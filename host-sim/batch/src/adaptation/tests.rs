@@ -153,7 +153,9 @@ fn the_study_s_loop_is_the_simulator_s() {
         let expected = 0.5 * (means[0][which] + means[1][which]);
         assert!((found.unwrap().mean - expected).abs() < 1e-9);
     }
-    assert_eq!((pair.law_slope, pair.product), (0.0, Some(0.0)));
+    let still = Mean::new(&[0.0; 2], Confidence::USUAL);
+    assert_eq!((Some(pair.law_slope), pair.product), (still, still));
+    assert_eq!(pair.small_gain(), SmallGain::Holds);
     assert_eq!(pair.against_first.unwrap().mean, 0.0);
     assert_eq!(pair.series.len(), 72);
 }
@@ -170,12 +172,69 @@ fn a_law_s_map_is_its_table_as_the_ecu_estimates_k_hg() {
     for (point, expected) in pair.map.iter().zip([0.322, 0.396]) {
         assert!((point.k_1.unwrap().mean - expected).abs() < 0.02, "{point:?}");
     }
-    assert!((pair.law_slope - 0.148).abs() < 0.06, "{}", pair.law_slope);
+    assert!((pair.law_slope.mean - 0.148).abs() < 0.06, "{}", pair.law_slope);
     // Trust reaches both ends in some time constants of 5 s: the driver's map forgets where it began.
     for point in &found.maps[0] {
         let [low, high] = point.k_hg.map(|k_hg| k_hg.unwrap().mean);
         assert!((low - high).abs() < 0.05, "{point:?}");
     }
+}
+
+/// A map of two points has one slope, linear in its means: with two seeds the interval is Student's of their slopes, 12.706 times half their
+/// difference, and the first seed's is known from a study of one.
+#[test]
+fn a_slope_s_interval_is_over_the_seeds() {
+    let kinds = Kinds::default();
+    let run = |text: &str| study(text, &kinds).unwrap().run(&Watch::nobody()).unwrap();
+    let (both, first) = (run(FILE), run(&FILE.replace("seeds = 2", "seeds = 1")));
+    let [both, first] = [both, first].map(|results| results.pairs[1].clone());
+    let slopes = [
+        (both.law_slope, first.law_slope),
+        (both.driver_slope.unwrap(), first.driver_slope.unwrap()),
+    ];
+    for (both, first) in slopes {
+        let [low, high] = both.interval.unwrap();
+        let expected = 12.706 * (both.mean - first.mean).abs();
+        assert!(
+            (0.5 * (high - low) - expected).abs() < 1e-3 * expected,
+            "{both} {first}"
+        );
+        assert_eq!(first.interval, None);
+    }
+    let product = both.product.unwrap();
+    assert!((product.mean - slopes[0].0.mean * slopes[1].0.mean).abs() < 1e-12);
+    assert_eq!(first.small_gain(), SmallGain::Untold);
+}
+
+/// A product is judged by its interval, at 0.5 and at 1 on both sides.
+#[test]
+fn small_gain_is_told_by_the_interval() {
+    let kinds = Kinds::default();
+    let found = study(FILE, &kinds).unwrap().run(&Watch::nobody()).unwrap();
+    let of = |low: f64, high: f64| {
+        let interval = Some([low, high]);
+        let product = Mean {
+            mean: 0.5 * (low + high),
+            interval,
+            level: Confidence::USUAL,
+        };
+        let pair = Pair {
+            product: Some(product),
+            ..found.pairs[1].clone()
+        };
+        pair.small_gain()
+    };
+    assert_eq!(of(0.1, 0.5), SmallGain::Holds);
+    assert_eq!(of(-0.1, 0.501), SmallGain::Untold);
+    assert_eq!(of(0.501, 0.999), SmallGain::WithoutMargin);
+    assert_eq!(of(0.501, 1.0), SmallGain::Untold);
+    assert_eq!(of(0.999, 3.0), SmallGain::Untold);
+    assert_eq!(of(1.0, 3.0), SmallGain::Fails);
+    let none = Pair {
+        product: None,
+        ..found.pairs[1].clone()
+    };
+    assert_eq!(none.small_gain(), SmallGain::TwoEquilibria);
 }
 
 #[test]

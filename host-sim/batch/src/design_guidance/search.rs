@@ -233,7 +233,7 @@ impl DesignGuidance {
         goals + BEYOND * beyond + f64::from(row.unstable)
     }
 
-    /// The ratios of held-out drives. Their intervals are Tukey's: each draw is left out in turn, for a ratio of means is no mean of ratios.
+    /// The ratios of held-out drives.
     pub(super) fn judged(&self, set: &Evaluated, paper: &Evaluated) -> [Mean; BARS.len()] {
         let drivers = &self.stages[1].drivers;
         let whole = ratios(&set.drivers, &paper.drivers, drivers);
@@ -247,20 +247,8 @@ impl DesignGuidance {
             _ => (0..count).map(without).collect(),
         };
         std::array::from_fn(|bar| {
-            let whole = whole[bar];
-            let pseudo = left
-                .iter()
-                .map(|left| whole + (count as f64 - 1.0) * (whole - left[bar]));
-            let found = Mean::new(&pseudo.collect::<Vec<_>>(), Confidence::USUAL);
-            let centred = |[low, high]: [f64; 2]| {
-                let half = 0.5 * (high - low);
-                [whole - half, whole + half]
-            };
-            Mean {
-                mean: whole,
-                interval: found.and_then(|found| found.interval).map(centred),
-                level: Confidence::USUAL,
-            }
+            let left: Vec<f64> = left.iter().map(|left| left[bar]).collect();
+            Mean::tukey(whole[bar], &left, Confidence::USUAL)
         })
     }
 

@@ -3,7 +3,7 @@
 use super::with_interval;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
-use haptic_batch::adaptation::{AdaptationResults, Pair, SMALL_GAIN, Seen, swings};
+use haptic_batch::adaptation::{AdaptationResults, Pair, SMALL_GAIN, Seen, SmallGain, swings};
 
 /// How long trust's shares remember (`haptic_sim::drivers`), s.
 const MEMORY_S: f64 = 5.0;
@@ -85,31 +85,36 @@ fn notes(results: &AdaptationResults) -> Vec<String> {
 
 fn products(results: &AdaptationResults) -> Table {
     let row = |pair: &Pair| {
-        let verdict = match pair.product {
-            None => "no: the driver has two equilibria",
-            Some(product) if product <= SMALL_GAIN => "yes",
-            Some(product) if product < 1.0 => "without margin",
-            Some(_) => "no",
+        let verdict = match pair.small_gain() {
+            SmallGain::TwoEquilibria => "no: the driver has two equilibria",
+            SmallGain::Holds => "yes",
+            SmallGain::WithoutMargin => "without margin",
+            SmallGain::Fails => "no",
+            SmallGain::Untold => "not told",
         };
+        let mean = |value: Option<&haptic_batch::Mean>| Cell::Text(with_interval(value));
         let [law, driver] = names(results, pair).map(Cell::text);
         [
             ("Law", law),
             ("Driver", driver),
-            ("dK_1/dK_hg (N.m)", Cell::number(pair.law_slope, 3)),
-            ("dK_hg/dK_1 (1/N.m)", Cell::number(pair.driver_slope, 3)),
-            ("Product", Cell::number(pair.product, 3)),
+            ("dK_1/dK_hg (N.m)", mean(Some(&pair.law_slope))),
+            ("dK_hg/dK_1 (1/N.m)", mean(pair.driver_slope.as_ref())),
+            ("Product", mean(pair.product.as_ref())),
             ("Small gain", Cell::text(verdict)),
         ]
     };
     let caption = format!(
-        "The largest slopes of law and driver, in size; small gain holds up to a product of {SMALL_GAIN}"
+        "The largest slopes of law and driver, in size, with the interval of each by itself; small gain holds up to a product of \
+         {SMALL_GAIN}, without margin below 1; not told: the interval lies on both sides of a limit"
     );
     Table::of_rows(caption, results.pairs.iter().map(row))
 }
 
 /// The laws with which small gain holds for every driver.
 fn judgement(results: &AdaptationResults) -> String {
-    let all = |law: usize| results.pairs.iter().all(|pair| pair.law != law || pair.holds());
+    let all = |law: usize| {
+        (results.pairs.iter()).all(|pair| pair.law != law || pair.small_gain() == SmallGain::Holds)
+    };
     let laws = results.laws.iter().enumerate();
     let held: Vec<&str> = laws
         .filter(|(law, _)| all(*law))
@@ -152,7 +157,7 @@ fn maps_figure(results: &AdaptationResults) -> Figure {
         };
         // A gain that does not move is an upright line.
         let pairs = results.pairs.iter();
-        let pairs = pairs.filter(|pair| pair.driver == number && pair.law_slope > 0.0);
+        let pairs = pairs.filter(|pair| pair.driver == number && pair.law_slope.mean > 0.0);
         let of_law = |pair: &Pair| {
             let points = pair
                 .map

@@ -30,7 +30,8 @@ pub fn report(results: &CompareResults) -> Report {
     });
     let first = &results.laws[0].name;
     let verdicts = vec![Block::Text(judgement(results)), Block::Table(worse(results))];
-    let mut of_all = vec![Block::Table(ratios(results))];
+    let others = Block::Table(ratios(results, false)).on_page();
+    let mut of_all = vec![Block::Table(ratios(results, true)), others];
     if !results.adapted.is_empty() {
         of_all.push(Block::Table(adapted(results)));
     }
@@ -267,10 +268,11 @@ fn laws(results: &CompareResults) -> Table {
     Table::of_rows(caption, results.laws.iter().map(row))
 }
 
-/// Every law in every world over the first law: the mean over the drivers, and who is worst off.
-fn ratios(results: &CompareResults) -> Table {
+/// Every law in every world over the first law, in the metrics that laws are judged by or in the others: the mean over the drivers, and who
+/// has the most.
+fn ratios(results: &CompareResults, judged: bool) -> Table {
     let shown: Vec<usize> = (0..results.metrics.len())
-        .filter(|place| results.metrics[*place].is_judged)
+        .filter(|place| results.metrics[*place].is_judged == judged && has_values(results, *place))
         .collect();
     let pairs =
         (1..results.laws.len()).flat_map(|law| (0..results.worlds.len()).map(move |world| (law, world)));
@@ -296,9 +298,16 @@ fn ratios(results: &CompareResults) -> Table {
     let labels = shown.iter().map(|place| results.metrics[*place].label);
     let columns = ["Law", "World"].into_iter().chain(labels);
     let caption = format!(
-        "Over {}, means over {}; * clearly not 1. In brackets the driver who is worst off, with an interval over {} that counts how many \
-         drivers he was chosen from",
-        results.laws[0].name, results.units[1], results.units[0]
+        "Over {}, means over {}{}. In brackets the driver with the largest, with an interval over {} that counts how many drivers he was \
+         chosen from",
+        results.laws[0].name,
+        results.units[1],
+        if judged {
+            "; * clearly not 1"
+        } else {
+            "; nothing is called clear"
+        },
+        results.units[0]
     );
     Table::new(caption, columns, pairs.map(row))
 }
