@@ -281,20 +281,14 @@ impl Problem<'_> {
         let [low, high] = T_NMS_RANGE_S;
         let about = |place: usize| self.assumed.iter().find(|a| a.place == place);
         let mut out = Vec::new();
-        if !self.is_free(T_NMS) {
-            out.push(match about(T_NMS) {
+        let of_arms = format!(" (arms have {low} to {high} s)");
+        let muscle = [(T_NMS, "t_nms", "s", &*of_arms), (K_NMS, "K_nms", "N.m/rad", "")];
+        for (place, name, unit, usual) in muscle.into_iter().filter(|m| !self.is_free(m.0)) {
+            out.push(match about(place) {
                 Some(Assumed { value, sd, .. }) => {
-                    format!("t_nms is {value} s, give or take {sd} s (arms have {low} to {high} s): the errors hold that")
+                    format!("{name} is {value} {unit}, give or take {sd} {unit}{usual}: the errors hold that")
                 }
-                None => format!("t_nms is {} s", p[T_NMS]),
-            });
-        }
-        if !self.is_free(K_NMS) {
-            out.push(match about(K_NMS) {
-                Some(Assumed { value, sd, .. }) => {
-                    format!("K_nms is {value} N.m/rad, give or take {sd} N.m/rad: the errors hold that")
-                }
-                None => format!("K_nms is {} N.m/rad", p[K_NMS]),
+                None => format!("{name} is {} {unit}", p[place]),
             });
         }
         if let Some(a) = about(OWN_OFFSET) {
