@@ -172,9 +172,7 @@ impl Problem<'_> {
                     .to_owned(),
             );
         }
-        found
-            .notes
-            .extend(self.hidden_gain_2(&mut found.parameters.gain_2));
+        found.notes.extend(hidden_gain_2(&mut found.parameters.gain_2));
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
             Some(inertia) => format!(
@@ -305,20 +303,6 @@ impl Problem<'_> {
             ));
         }
         out
-    }
-
-    /// A line of the driver's own that is not estimated hides gain_2: one that is told from 0 by less than this many standard errors is not
-    /// called identified.
-    fn hidden_gain_2(&self, gain_2: &mut Parameter) -> Option<String> {
-        let is_target_line = self.assumed.iter().any(|a| a.place == OWN_OFFSET);
-        let (gain, error) = gain_2.estimate.zip(gain_2.standard_error)?;
-        (is_target_line && !gain_2.fixed && gain_2.identified && gain < HIDDEN * error).then(|| {
-            gain_2.estimate = None;
-            gain_2.identified = false;
-            "gain_2 is not told from 0, as where a driver keeps another line than the target line: a longer drive, or --fix line_offset \
-             tells more"
-                .to_owned()
-        })
     }
 
     /// Calls nothing identified that this kind of record does not tell, and says why.
@@ -464,6 +448,19 @@ impl Problem<'_> {
     }
 }
 
+/// A line of the driver's own hides gain_2, or takes its place: one that is told from 0 by less than this many standard errors is not
+/// called identified.
+fn hidden_gain_2(gain_2: &mut Parameter) -> Option<String> {
+    let (gain, error) = gain_2.estimate.zip(gain_2.standard_error)?;
+    (!gain_2.fixed && gain_2.identified && gain < HIDDEN * error).then(|| {
+        gain_2.estimate = None;
+        gain_2.identified = false;
+        "gain_2 is not told from 0, as where a driver keeps another line than the target line: a longer drive, or --fix line_offset \
+         tells more"
+            .to_owned()
+    })
+}
+
 /// What the tests of the driver's constancy and of the sensors see, and what they do not.
 fn power_of(found: &Identification) -> Vec<String> {
     let mut out = Vec::new();
@@ -535,6 +532,32 @@ mod tests {
     use super::*;
     use crate::identify::log::DriveLog;
     use crate::identify::prepare::prepare;
+
+    /// A gain_2 of 0.001 +- 0.002 is not called identified, whether a line is estimated beside it or not; one of 0.005, a given one and one
+    /// that was not identified stay as they are.
+    #[test]
+    fn a_gain_2_that_is_not_told_from_0_is_hidden() {
+        let found = |gain: f64, fixed, identified| Parameter {
+            estimate: Some(gain),
+            standard_error: Some(0.002),
+            identified,
+            fixed,
+            ..Parameter::ABSENT
+        };
+        for (mut gain_2, hidden) in [
+            (found(0.001, false, true), true),
+            (found(0.005, false, true), false),
+            (found(0.001, true, true), false),
+            (found(0.001, false, false), false),
+        ] {
+            let was = gain_2;
+            assert_eq!(hidden_gain_2(&mut gain_2).is_some(), hidden);
+            assert_eq!(
+                gain_2.identified && gain_2.estimate.is_some(),
+                !hidden && was.identified
+            );
+        }
+    }
 
     /// A parabola of standard error 0.05 about 0.2 passes 3.841 at 0.2 -+ 1.96 * 0.05, whatever the points; cut off at 0.15, it
     /// ends there.
