@@ -13,12 +13,13 @@ use super::{
     START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS,
 };
 use crate::identify::balance::Balance;
-use crate::identify::change::{BLIP_S, Change, Power};
+use crate::identify::change::{BLIP_S, Change, Power, SWING_S, Shape};
 use crate::identify::diagnostics;
 use crate::identify::motion::of_motion;
 use crate::identify::options::Options;
-use crate::identify::result::Refutation;
-use crate::identify::result::{AtTNms, Identification, Parameter, Parameters, STANDARD_NORMAL_95};
+use crate::identify::result::{
+    AtTNms, Identification, Parameter, Parameters, Refutation, STANDARD_NORMAL_95,
+};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
 use crate::identify::verdict;
 
@@ -125,9 +126,8 @@ impl Problem<'_> {
             });
         }
         let change = found.constancy.as_ref().and_then(|c| c.change.clone());
-        let sensor = change
-            .as_ref()
-            .and_then(|c| self.changed_sensor(c, options.manual));
+        let staying = change.as_ref().filter(|c| c.shape != Shape::Swing);
+        let sensor = staying.and_then(|c| self.changed_sensor(c, options.manual));
         if sensor.is_none() {
             let balance = found.balance.iter();
             refuted.extend(balance.flat_map(|b| verdict::of_balance(b, options.assisted)));
@@ -467,32 +467,31 @@ fn power_of(found: &Identification) -> Vec<String> {
     if let Some(constancy) = &found.constancy {
         let of = |pick: fn(&Power) -> Option<f64>| -> String {
             let seen = constancy.power.iter().filter_map(|p| {
-                let least = pick(p);
-                Some(match p.parameter {
-                    "k_hg" => least
-                        .filter(|x| *x < 1.0)
-                        .map_or("no k_hg".to_owned(), |x| format!("k_hg by {x:.2}")),
-                    "k_d" => least
-                        .filter(|x| *x < 1.0)
-                        .map_or("no gains".to_owned(), |x| format!("gains by {:.0} %", 100.0 * x)),
-                    "t_p" => least
-                        .filter(|x| *x < 0.6)
-                        .map_or("no t_p".to_owned(), |x| format!("t_p by {x:.2} s")),
+                let (name, most, scale, digits, unit) = match p.parameter {
+                    "k_d" => ("gains", 1.0, 100.0, 0, " %"),
+                    "gain_1" => ("gain_1 alone", 2.0, 1.0, 2, " N.m/m"),
+                    "k_hg" => ("k_hg", 1.0, 1.0, 2, ""),
+                    "t_p" => ("t_p", 0.6, 1.0, 2, " s"),
                     _ => return None,
-                })
+                };
+                let least = pick(p).filter(|x| *x < most);
+                let shown = |x: f64| format!("{name} by {:.digits$}{unit}", scale * x);
+                Some(least.map_or(format!("no {name}"), shown))
             });
             seen.collect::<Vec<_>>().join(", ")
         };
-        let blind = constancy
-            .power
-            .iter()
-            .all(|p| p.step.is_none_or(|x| x > 0.5 || p.parameter == "t_p" && x > 0.3));
+        let seen = |key: &str, most: f64| {
+            let mut of_key = constancy.power.iter().filter(|p| p.parameter == key);
+            of_key.any(|p| p.step.is_some_and(|x| x <= most))
+        };
+        let blind = !(seen("k_hg", 0.5) || seen("k_d", 0.5) || seen("t_p", 0.3));
         out.push(format!(
-            "the driver is the same throughout{}: of nine changes in ten, one that stays is seen from here on ({}), and one of {BLIP_S} \
-             s ({})",
+            "the driver is the same throughout{}: of nine changes in ten, one that stays is seen from here on ({}), one of {BLIP_S} \
+             s ({}), and one to and fro each {SWING_S} s ({})",
             if blind { ", which this drive is too short to tell" } else { "" },
             of(|p| p.step),
             of(|p| p.blip),
+            of(|p| p.swing),
         ));
     }
     let too_little = match &found.balance {
