@@ -24,7 +24,7 @@ use serde::Serialize;
 
 use super::log::DriveLog;
 use super::switches::Switches;
-use super::wide::{add_times, dot};
+use super::wide::{add_times, dot, lagged, median};
 
 /// Explained share of T_d above which it tells scales and instants too: gusts of 250 N leave 87 % and make a scale of 0.2 of a right one, a motor's
 /// ripple of 0.06 N.m leaves 98.8 % and makes one of 0.78, and without them it is more than 99.5 %.
@@ -139,17 +139,6 @@ fn pass(u: &[f64], dt: f64, shift_s: f64) -> Passed {
     out
 }
 
-fn lagged(u: &[f64], dt: f64, t: f64) -> Vec<f64> {
-    let share = 1.0 - (-dt / t).exp();
-    let mut y = u[0];
-    u.iter()
-        .map(|&x| {
-            y += share * (x - y);
-            y
-        })
-        .collect()
-}
-
 /// T_h for lines between its rows: a switch is put where it was, not half a row before its row.
 fn held(log: &DriveLog) -> Vec<f64> {
     let switches = Switches::of(log);
@@ -165,16 +154,11 @@ fn held(log: &DriveLog) -> Vec<f64> {
 
 /// Which way the wheel turns, between -1 and 1 where it hardly does.
 fn turning(phi: &[f64], dt: f64) -> Vec<f64> {
-    let share = 1.0 - (-dt / RATE_S).exp();
-    let mut smooth = phi.to_vec();
-    let mut y = phi.first().copied().unwrap_or(0.0);
-    let mut pass = |x: &mut f64| {
-        y += share * (*x - y);
-        *x = y;
-    };
-    smooth.iter_mut().for_each(&mut pass);
     // Backwards too, so that nothing is late.
-    smooth.iter_mut().rev().for_each(pass);
+    let mut smooth = lagged(phi, dt, RATE_S);
+    smooth.reverse();
+    let mut smooth = lagged(&smooth, dt, RATE_S);
+    smooth.reverse();
     let last = smooth.len() - 1;
     (0..=last)
         .map(|k| {
@@ -226,8 +210,7 @@ fn step_of(angle: &[f64], rows: &[usize]) -> f64 {
     if changes.is_empty() || 2 * changes.len() > rows.len() {
         return 0.0;
     }
-    let middle = changes.len() / 2;
-    *changes.select_nth_unstable_by(middle, f64::total_cmp).1
+    median(&mut changes)
 }
 
 /// The balance over `rows`.

@@ -21,6 +21,8 @@ pub enum Shape {
     Drift,
     /// From the first instant to the last one only.
     Blip,
+    /// To and fro throughout the record, each way as long as from the first instant to the last one.
+    Swing,
 }
 
 /// The least change of a parameter that a record would show in nine of ten drives.
@@ -32,10 +34,14 @@ pub struct Power {
     pub step: Option<f64>,
     /// A change for [`BLIP_S`] that then goes back; none if none is seen.
     pub blip: Option<f64>,
+    /// A change to and fro, each way for about [`SWING_S`]; none if none is seen.
+    pub swing: Option<f64>,
 }
 
 /// Length of the blip that the power is told of, s.
 pub const BLIP_S: f64 = 8.0;
+/// How long each way lasts of the swing that the power is told of, s.
+pub(crate) const SWING_S: f64 = 15.0;
 
 /// How constant the driver of a record was.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,24 +57,17 @@ pub struct Constancy {
     pub change: Option<Change>,
 }
 
-impl Constancy {
-    /// By how much the likeliest change is beyond its level.
-    pub(crate) fn beyond(&self) -> f64 {
-        self.deviance - self.level
-    }
-}
-
 /// A change of the driver.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
-    /// Key of what changed: k_hg, k_d (all gains by one factor) or t_p; driver_torque_nm for the offset of that sensor; e_y_m
+    /// Key of what changed: k_hg, k_d (all gains by one factor), gain_1 (alone) or t_p; driver_torque_nm for the offset of that sensor; e_y_m
     /// for the driver's line or the offset of that sensor.
     pub parameter: &'static str,
     /// How it goes on.
     pub shape: Shape,
-    /// First and last instant of the change, s: the same for a step.
+    /// First and last instant of the change, s: the same for a step, and of a swing those of its first way out.
     pub at_s: [f64; 2],
-    /// 95 % intervals of these instants, s.
+    /// 95 % intervals of these instants, s; of a swing the whole record, for no part of it is of one driver.
     pub at_95_s: [[f64; 2]; 2],
     /// By how much; of k_d the share of the gains, of e_y_m (the driver's line or the camera's offset, which no log tells apart)
     /// the slope that it makes of the torque, N.m/s.
@@ -85,6 +84,7 @@ impl Change {
             Shape::Step => format!("at {from:.0} s"),
             Shape::Drift => format!("from {from:.0} to {to:.0} s"),
             Shape::Blip => format!("between {from:.0} and {to:.0} s"),
+            Shape::Swing => format!("to and fro, each way for {:.0} s", to - from),
         }
     }
 
@@ -104,6 +104,7 @@ impl fmt::Display for Change {
         };
         let by = match self.parameter {
             "k_d" => format!("{:+.0} %", 100.0 * self.by),
+            "gain_1" => format!("{:+.2} N.m/m", self.by),
             "t_p" => format!("{:+.3} s", self.by),
             T_D => format!("{:+.3} N.m", self.by),
             E_Y => format!("what makes {:+.4} N.m/s of the driver's integral", self.by),
@@ -114,6 +115,7 @@ impl fmt::Display for Change {
             Shape::Step => "changed",
             Shape::Drift => "drifted",
             Shape::Blip => "differed",
+            Shape::Swing => return write!(f, "{name} swung by {by} {}", self.when()),
         };
         write!(f, "{name} {verb} by {by} {}", self.when())?;
         write!(f, " ({first:.0} to {last:.0} s, 95 %)")

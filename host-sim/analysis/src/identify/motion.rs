@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::log::DriveLog;
 use super::result::Refutation;
 use super::verdict::{CERTAIN, SIGNS};
+use super::wide::running_mean;
 
 /// Span of the running means, s, of the differences, s, and of the blocks that errors are taken from, s.
 const MEAN_S: f64 = 2.0;
@@ -118,18 +119,8 @@ fn jump(log: &DriveLog, stretches: &[Range<usize>]) -> Option<Refutation> {
 
 /// `u` less its running mean.
 fn beside_mean(u: &[f64], half: usize) -> Vec<f64> {
-    let sums: Vec<f64> = std::iter::once(0.0)
-        .chain(u.iter().scan(0.0, |sum, x| {
-            *sum += x;
-            Some(*sum)
-        }))
-        .collect();
-    (0..u.len())
-        .map(|k| {
-            let (from, to) = (k.saturating_sub(half), (k + half + 1).min(u.len()));
-            u[k] - (sums[to] - sums[from]) / (to - from) as f64
-        })
-        .collect()
+    let mean = running_mean(u, half);
+    u.iter().zip(mean).map(|(u, mean)| u - mean).collect()
 }
 
 fn rate(u: &[f64], half: usize, dt_s: f64) -> Vec<f64> {
@@ -145,19 +136,16 @@ fn rate(u: &[f64], half: usize, dt_s: f64) -> Vec<f64> {
 /// A regression of `y` on `x` beside `z`: the weight of `x` in its standard errors, from the scatter of blocks.
 fn weight_of(y: &[f64], x: &[f64], z: &[f64], rows: &[usize], block: usize) -> f64 {
     let product = |a: &[f64], b: &[f64]| rows.iter().map(|&k| a[k] * b[k]).sum::<f64>();
-    let of_z = if product(z, z) > 0.0 {
-        product(x, z) / product(z, z)
-    } else {
-        0.0
+    // A column that is zero has no weight.
+    let beside = |sum: f64| {
+        let square = product(z, z);
+        if square > 0.0 { sum / square } else { 0.0 }
     };
+    let of_z = beside(product(x, z));
     let alone: Vec<f64> = x.iter().zip(z).map(|(x, z)| x - of_z * z).collect();
     let information = product(&alone, &alone);
     let weight = product(&alone, y) / information;
-    let rest_z = if product(z, z) > 0.0 {
-        (product(y, z) - weight * product(x, z)) / product(z, z)
-    } else {
-        0.0
-    };
+    let rest_z = beside(product(y, z) - weight * product(x, z));
     let scatter: f64 = rows
         .chunks(block)
         .map(|rows| {

@@ -7,7 +7,7 @@
 
 use serde::Serialize;
 
-use super::change::{Change, Constancy, SHORTEST_S};
+use super::change::{Change, Constancy, SHORTEST_S, Shape};
 use super::log::DriveLog;
 use super::noise_model::identify_prepared;
 use super::options::Options;
@@ -56,7 +56,8 @@ pub fn identify_in_pieces(log: &DriveLog, options: &Options) -> Pieces {
             let from_s = i.checked_sub(1).map_or(start_s, |i| changes[i].within_s()[1]);
             let to_s = changes.get(i + 1).map_or(end_s, |c| c.within_s()[0]);
             let alone = whole.piece([from_s, to_s]);
-            if let Some(change) = alone.as_ref().and_then(|p| p.identification.changed()) {
+            let again = alone.as_ref().and_then(|p| p.identification.changed());
+            if let Some(change) = again.filter(|c| c.shape != Shape::Swing) {
                 changes[i] = change.clone();
             }
         }
@@ -107,7 +108,8 @@ impl Whole<'_> {
         let Some(piece) = self.piece([from_s, to_s]) else {
             return;
         };
-        let Some(change) = piece.identification.changed() else {
+        // What goes to and fro is everywhere: the piece stays, refuted.
+        let Some(change) = piece.identification.changed().filter(|c| c.shape != Shape::Swing) else {
             return;
         };
         let [before_s, after_s] = change.within_s();
@@ -136,7 +138,7 @@ impl Prepared {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::change::{Power, Shape};
+    use crate::identify::change::Power;
 
     #[test]
     fn a_piece_shows_what_is_no_smaller_than_its_power() {
@@ -147,6 +149,7 @@ mod tests {
                 parameter: "k_hg",
                 step,
                 blip: None,
+                swing: None,
             }],
             change: None,
         };

@@ -87,9 +87,9 @@ impl Parameter {
             standard_error: Some(0.0),
             interval_95: Some([value, value]),
             identified: true,
-            on_bound: false,
             fixed: true,
             optimum: Some(value),
+            ..Self::ABSENT
         }
     }
 

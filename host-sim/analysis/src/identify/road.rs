@@ -7,6 +7,7 @@
 
 use super::log::DriveLog;
 use super::signals::integral;
+use super::wide::lagged;
 
 /// How far ahead the far and the near point are, s.
 const FAR_S: f64 = 1.0;
@@ -39,18 +40,6 @@ pub(super) fn road(log: &DriveLog) -> [Vec<f64>; 2] {
             .collect(),
         rows.map(|k| smooth[at(k)] - smooth[0]).collect(),
     ]
-}
-
-/// `u` through a first-order lag, from its first value.
-fn lagged(u: &[f64], dt_s: f64, lag_s: f64) -> Vec<f64> {
-    let share = 1.0 - (-dt_s / lag_s).exp();
-    let mut y = u.first().copied().unwrap_or(0.0);
-    u.iter()
-        .map(|&x| {
-            y += share * (x - y);
-            y
-        })
-        .collect()
 }
 
 /// Slope of `y` over `x`; zero where `x` does not move.

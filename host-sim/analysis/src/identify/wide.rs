@@ -40,6 +40,40 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     parts.iter().sum::<f64>() + rest
 }
 
+/// The middle one of some values, whose order it changes; zero of none.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    match values.len() {
+        0 => 0.0,
+        n => *values.select_nth_unstable_by(n / 2, f64::total_cmp).1,
+    }
+}
+
+/// `u` through a first-order lag, from its first value.
+pub(crate) fn lagged(u: &[f64], dt_s: f64, lag_s: f64) -> Vec<f64> {
+    let share = 1.0 - (-dt_s / lag_s).exp();
+    let mut y = u.first().copied().unwrap_or(0.0);
+    u.iter()
+        .map(|&x| {
+            y += share * (x - y);
+            y
+        })
+        .collect()
+}
+
+/// The mean of each row of `u` and so many to both sides, as far as there are any.
+pub(crate) fn running_mean(u: &[f64], half: usize) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    for x in u {
+        sums.push(sums[sums.len() - 1] + x);
+    }
+    (0..u.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(half), (k + half + 1).min(u.len()));
+            (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect()
+}
+
 /// Adds `factor` times `more` to `sum`, over the shorter of the two.
 pub(crate) fn add_times(sum: &mut [f64], factor: f64, more: &[f64]) {
     for (s, x) in sum.iter_mut().zip(more) {

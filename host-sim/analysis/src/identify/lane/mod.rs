@@ -25,6 +25,7 @@
 mod tests;
 mod trend;
 
+use super::wide::{lagged, median};
 use nalgebra::DMatrix;
 use serde::Serialize;
 use trend::{COLUMNS, Filter, Likelihood, Row, likelihood};
@@ -86,17 +87,7 @@ pub(crate) struct LaneDoubt {
 fn answers(wheel_angle: &[f64], dt: f64, integrals: usize) -> Vec<Vec<f64>> {
     let mut out: Vec<Vec<f64>> = VEHICLE_LAGS_S
         .iter()
-        .map(|&t| {
-            let share = 1.0 - (-dt / t).exp();
-            let mut y = wheel_angle[0];
-            wheel_angle
-                .iter()
-                .map(|&u| {
-                    y += share * (u - y);
-                    y
-                })
-                .collect()
-        })
+        .map(|&t| lagged(wheel_angle, dt, t))
         .collect();
     let mut whole = wheel_angle.to_vec();
     for _ in 0..integrals {
@@ -119,13 +110,8 @@ fn noise_of_differences(signal: &[f64], weight: &[f64]) -> f64 {
         .windows(4)
         .map(|u| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs())
         .collect();
-    if third.is_empty() {
-        return 0.0;
-    }
-    let middle = third.len() / 2;
-    let (_, median, _) = third.select_nth_unstable_by(middle, f64::total_cmp);
     // Median of |x| of a standard normal variable: 0.6745.
-    *median / 0.674_5 / 20.0_f64.sqrt()
+    median(&mut third) / 0.674_5 / 20.0_f64.sqrt()
 }
 
 /// Smooths the place (`integrals` 2) or the angle (1) of the lane, with the vehicle's answer in it or without (`by_motion`). `weight` is

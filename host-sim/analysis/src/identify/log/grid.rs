@@ -7,6 +7,7 @@
 use haptic_log::recording::Lines;
 
 use super::super::switches::SWITCH_RATE_NM_S;
+use super::super::wide::median;
 use super::{GUIDANCE_COLUMN, LogError, SHORTEST_S, refuse, too_short};
 
 /// Share of a sample period by which a time stamp may miss the even grid: rounding to a millisecond makes it 6 %
@@ -281,8 +282,7 @@ pub(super) fn usual_step(time: &[f64], lines: &Lines) -> Result<f64, LogError> {
             time[k + 1]
         ));
     }
-    let middle = steps.len() / 2;
-    let (_, &mut usual, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let usual = median(&mut steps);
     let (low, high) = SAMPLE_PERIOD_RANGE_S;
     if !(low..=high).contains(&usual) {
         return refuse(format!(

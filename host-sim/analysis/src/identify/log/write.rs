@@ -12,17 +12,11 @@ impl DriveLog {
     /// # Errors
     /// What `out` says.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let signals = [
-            &self.e_y_m,
-            &self.e_theta_rad,
-            &self.wheel_angle_rad,
-            &self.guidance_torque_nm,
-            &self.driver_torque_nm,
-        ];
         let mut table = TableWriter::new(out, COLUMNS)?;
         for k in 0..self.len() {
             let time = format!("{:.6}", self.time_s(k));
-            table.row(std::iter::once(time).chain(signals.map(|signal| format!("{:.9}", signal[k]))))?;
+            table
+                .row(std::iter::once(time).chain(self.signals().map(|signal| format!("{:.9}", signal[k]))))?;
         }
         table.finish()
     }

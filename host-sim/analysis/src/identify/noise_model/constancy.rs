@@ -10,6 +10,9 @@
 //! instability and structural change with unknown change point", Econometrica 61, 1993). The largest value over all
 //! instants and directions is compared with [`LEVEL`]. Everything is computed from sums over blocks of [`BLOCK_S`].
 //!
+//! Changes that go back after some seconds have a level of their own, and so have those to and fro, which are looked for where nothing
+//! else is found: `r_t` is then a square wave, of every length of a way and from four instants on, so that the values are a spectrum of the scores.
+//!
 //! The interval of the instant is where the value is below its maximum by at most `WITHIN_95` of
 //! [`super::change_score`] (Hansen, "Sample splitting and threshold estimation", Econometrica 68, 2000).
 
@@ -31,21 +34,75 @@ use crate::identify::verdict;
 /// declared changed, whatever else their logs have.
 const LEVEL: f64 = 20.0;
 /// The level of a change that goes back: it has a length besides, and more of them are tried.
-const BLIP_LEVEL: f64 = 24.0;
+const LEVEL_OF_BLIP: f64 = 24.0;
+/// The level of a change to and fro, of which more still are tried, in scores that scatter unevenly besides.
+const LEVEL_OF_SWING: f64 = 30.0;
 /// Above this value a change is not declared yet, but widens the errors of the estimates.
 const DOUBT: f64 = 10.0;
 /// What a changed delay may lie beyond its bounds, s.
 const DELAY_SLACK_S: f64 = 0.05;
 
+/// What may change: its key, the least change that matters, and the direction.
+type Direction = (&'static str, f64, Local);
+
+/// The likeliest change of a shape along a direction.
+struct Tried {
+    deviance: f64,
+    level: f64,
+    change: Option<Change>,
+    freed: Freed,
+    /// Share of the blocks that are changed.
+    after: f64,
+}
+
+impl Tried {
+    /// By how much it is beyond its level.
+    fn beyond(&self) -> f64 {
+        self.deviance - self.level
+    }
+}
+
 /// Counts of changes of a delay only what delays can do: the likelihood is a parabola about one optimum, and its top may lie where no
 /// delay is.
-fn hold_possible<T>(t_p_s: f64, tried: &mut [(T, Freed)]) {
+fn possible<T>(parameter: &str, t_p_s: f64, mut tried: Vec<(T, Freed)>) -> Vec<(T, Freed)> {
     let room_s = |by: f64| DELAY_SLACK_S + if by > 0.0 { LONGEST_DELAY_S - t_p_s } else { t_p_s };
-    for (_, freed) in tried {
+    for (_, freed) in tried.iter_mut().filter(|_| parameter == "t_p") {
         let share = |by: f64| (room_s(by) / by.abs()).min(1.0);
         let share = freed.sides_of(T_P).map(share).into_iter().fold(1.0, f64::min);
         freed.deviance *= share * (2.0 - share);
     }
+    tried
+}
+
+/// Whether what changes is a sensor's. A slow remnant looks like an offset that comes and goes.
+fn is_offset(parameter: &str) -> bool {
+    [T_D, E_Y].contains(&parameter)
+}
+
+/// The likeliest swing of each parameter of the driver.
+fn swings(fitted: &Fitted, directions: &[Direction], t_p_s: f64) -> Vec<Tried> {
+    let swings = fitted.swings();
+    let of = |(parameter, enough, direction): &Direction| {
+        let freed = swings
+            .iter()
+            .filter_map(|(swing, sum)| Some((*swing, fitted.freed(sum, direction)?)));
+        let tried = possible(parameter, t_p_s, freed.collect());
+        let found @ (swing, freed) = most(&tried)?;
+        let deviance = freed.deviance / fitted.wider(|| fitted.swung(*swing), freed);
+        let changed = deviance > LEVEL_OF_SWING && freed.by.abs() > *enough;
+        Some(Tried {
+            deviance,
+            level: LEVEL_OF_SWING,
+            change: changed.then(|| fitted.change_of_swing(parameter, found)),
+            freed: freed.clone(),
+            after: fitted.swung(*swing).sum::<f64>() / fitted.blocks.len() as f64,
+        })
+    };
+    directions
+        .iter()
+        .filter(|d| !is_offset(d.0))
+        .filter_map(of)
+        .collect()
 }
 
 impl Problem<'_> {
@@ -63,35 +120,62 @@ impl Problem<'_> {
         let fitted = self.fitted(&self.kept_rows(p, Line::Torques), variance);
         let unit = |i: usize| Local::from_fn(|j, _| f64::from(i == j && (i > T_P || self.is_free(i))));
         let gains = (0..3).map(|i| unit(i) * p[i]).sum();
-        let directions: [(&'static str, f64, Local); 5] = [
+        let directions: [Direction; 6] = [
             ("k_d", 0.1, gains),
             ("k_hg", 0.05, unit(K_HG)),
             ("t_p", 0.015, unit(T_P)),
             (T_D, 0.02, unit(OFFSET)),
             (E_Y, 0.0005, unit(OWN_OFFSET)),
+            ("gain_1", 0.1 * p[0], unit(0)),
         ];
-        let levels = [LEVEL, BLIP_LEVEL];
         let power = directions
             .iter()
-            .map(|(name, _, d)| fitted.power(name, d, levels))
+            .map(|(name, _, d)| fitted.power(name, d, [LEVEL, LEVEL_OF_BLIP, LEVEL_OF_SWING]))
             .collect();
-        let mut best: Option<(Constancy, [DVector<f64>; 2], f64)> = None;
+        let mut tried = self.steps_and_blips(&fitted, &directions[..5], p[T_P], manual);
+        if tried.iter().all(|t| t.change.is_none()) {
+            let alone = self.steps_and_blips(&fitted, &directions[5..], p[T_P], manual);
+            let more = swings(&fitted, &directions, p[T_P]).into_iter().chain(alone);
+            // They refute and widen nothing: of so many, one is often nearly likely.
+            tried.extend(more.filter(|t| t.change.is_some()));
+        }
+        let likelier = |a: Tried, b: Tried| if b.beyond() > a.beyond() { b } else { a };
+        let best = tried.into_iter().reduce(likelier)?;
+        if best.beyond() > DOUBT - LEVEL {
+            let sides: [_; T_P + 1] = std::array::from_fn(|i| best.freed.sides_of(i));
+            for (side, share) in [1.0 - best.after, best.after].into_iter().enumerate() {
+                for i in 0..=T_P {
+                    for j in 0..=T_P {
+                        errors[(i, j)] += share * sides[i][side] * sides[j][side];
+                    }
+                }
+            }
+        }
+        Some(Constancy {
+            deviance: best.deviance,
+            level: best.level,
+            power,
+            change: best.change,
+        })
+    }
+
+    /// The likeliest step of everything that may change, and the likeliest blip of what is the driver's.
+    fn steps_and_blips(
+        &self,
+        fitted: &Fitted,
+        directions: &[Direction],
+        t_p_s: f64,
+        manual: bool,
+    ) -> Vec<Tried> {
         let blocks = fitted.blocks.len();
-        let mut take = |found: Constancy, freed: &Freed, changed: Range<usize>| {
-            if best.as_ref().is_none_or(|b| b.0.beyond() < found.beyond()) {
-                let share = changed.len() as f64 / blocks as f64;
-                best = Some((found, fitted.sides(freed, changed), share));
-            }
-        };
-        for (parameter, enough, direction) in &directions {
-            let mut steps = fitted.steps(direction);
-            if *parameter == "t_p" {
-                hold_possible(p[T_P], &mut steps);
-            }
+        let mut out = Vec::new();
+        for (parameter, enough, direction) in directions {
+            let steps = possible(parameter, t_p_s, fitted.steps(direction));
             let Some((at, step)) = most(&steps) else {
                 continue;
             };
-            let wider = fitted.wider(*at, step);
+            let stays = || fitted.within(*at..blocks);
+            let wider = fitted.wider(stays, step);
             let deviance = step.deviance / wider;
             let changed = deviance > LEVEL && step.by.abs() > *enough;
             let change = changed.then(|| fitted.change(parameter, direction, &steps, wider));
@@ -99,48 +183,32 @@ impl Problem<'_> {
             if change.as_ref().is_some_and(|c| self.is_no_sensor(c, manual)) {
                 continue;
             }
-            let found = Constancy {
+            out.push(Tried {
                 deviance,
                 level: LEVEL,
-                power: Vec::new(),
                 change,
-            };
-            take(found, step, *at..blocks);
-            // A slow remnant looks like an offset that comes and goes.
-            let mut blips = if [T_D, E_Y].contains(parameter) {
-                Vec::new()
-            } else {
-                fitted.blips(direction)
-            };
-            if *parameter == "t_p" {
-                hold_possible(p[T_P], &mut blips);
+                freed: step.clone(),
+                after: (blocks - at) as f64 / blocks as f64,
+            });
+            if is_offset(parameter) {
+                continue;
             }
+            let blips = possible(parameter, t_p_s, fitted.blips(direction));
             let Some(found @ ([from, to], blip)) = most(&blips) else {
                 continue;
             };
             // Its own few blocks would not tell by how much the scores scatter.
             let deviance = blip.deviance / wider;
-            let changed = deviance > BLIP_LEVEL && blip.by.abs() > *enough;
-            let constancy = Constancy {
+            let changed = deviance > LEVEL_OF_BLIP && blip.by.abs() > *enough;
+            out.push(Tried {
                 deviance,
-                level: BLIP_LEVEL,
-                power: Vec::new(),
+                level: LEVEL_OF_BLIP,
                 change: changed.then(|| fitted.change_of_blip(parameter, found)),
-            };
-            take(constancy, blip, *from..*to);
+                freed: blip.clone(),
+                after: (to - from) as f64 / blocks as f64,
+            });
         }
-        let (mut constancy, sides, after) = best?;
-        constancy.power = power;
-        if constancy.deviance - constancy.level > DOUBT - LEVEL {
-            for (side, share) in sides.iter().zip([1.0 - after, after]) {
-                for i in 0..=T_P {
-                    for j in 0..=T_P {
-                        errors[(i, j)] += share * side[i] * side[j];
-                    }
-                }
-            }
-        }
-        Some(constancy)
+        out
     }
 
     /// Whether the balance of the column's torques shows that a sensor changed, before against after the middle of a
@@ -158,31 +226,28 @@ impl Problem<'_> {
         let change = self
             .constancy(p, variance, manual, &mut unused)
             .and_then(|c| c.change);
-        let Some(change) = change.filter(|c| c.parameter == T_D) else {
-            return false;
-        };
-        let weighed = |b: &Balance| b.explained >= verdict::BALANCE_SEEN;
-        let sides = self.balances(&change, manual);
-        sides.filter(|s| s.iter().all(weighed)).is_some_and(|sides| {
-            let [[was, error_was], [is, error]] = sides.map(|b| b.offset_nm);
-            let moved = is - was;
-            moved * change.by > 0.0 && moved.abs() > verdict::CERTAIN * error.hypot(error_was)
+        let seen = |b: &Balance| b.explained >= verdict::BALANCE_SEEN;
+        change.is_some_and(|c| {
+            let moved = self.offset_moves(&c, manual, seen);
+            moved.is_some_and(|[moved, error]| moved > verdict::CERTAIN * error)
         })
     }
 
     /// Whether the balance of the column's torques denies that the torque sensor's offset changed: what the torque on the wheel did, a
     /// driver did.
     fn is_no_sensor(&self, change: &Change, manual: bool) -> bool {
-        let Some(sides) = Some(change)
-            .filter(|c| c.parameter == T_D)
-            .and_then(|c| self.balances(c, manual))
-        else {
-            return false;
-        };
-        let is_weighed = sides.iter().all(Balance::is_close);
-        let [[was, error_was], [is, error]] = sides.map(|b| b.offset_nm);
-        let (moved, said) = ((is - was) * change.by.signum(), change.by.abs());
-        is_weighed && moved < 0.5 * said && said - moved > verdict::CERTAIN * error.hypot(error_was)
+        let said = change.by.abs();
+        let moved = self.offset_moves(change, manual, Balance::is_close);
+        moved.is_some_and(|[moved, error]| moved < 0.5 * said && said - moved > verdict::CERTAIN * error)
+    }
+
+    /// By how much the offset of the balance of torques moved the way that the torque sensor's is said to, and its standard error;
+    /// none of another change, and where the balance is not as `weighed`.
+    fn offset_moves(&self, change: &Change, manual: bool, weighed: fn(&Balance) -> bool) -> Option<[f64; 2]> {
+        let is_offset = change.parameter == T_D;
+        let sides = is_offset.then(|| self.balances(change, manual)).flatten();
+        let [[was, error_was], [is, error]] = sides.filter(|s| s.iter().all(weighed))?.map(|b| b.offset_nm);
+        Some([(is - was) * change.by.signum(), error.hypot(error_was)])
     }
 
     /// The balances of the column's torques before and after the middle of a change.
@@ -283,9 +348,9 @@ mod tests {
                 step: DVector::zeros(LOCAL),
                 variance: 1.0,
             };
-            let mut steps = fitted.steps(&unit);
+            let steps = fitted.steps(&unit);
             let before = most(&steps).unwrap().1.deviance;
-            hold_possible(0.1, &mut steps);
+            let steps = possible("t_p", 0.1, steps);
             [before, steps.iter().find(|s| s.0 == 20).unwrap().1.deviance]
         };
         for sign in [1.0, -1.0] {

@@ -13,12 +13,13 @@ use super::{
     START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS,
 };
 use crate::identify::balance::Balance;
-use crate::identify::change::{BLIP_S, Change, Power};
+use crate::identify::change::{BLIP_S, Change, Power, SWING_S, Shape};
 use crate::identify::diagnostics;
 use crate::identify::motion::of_motion;
 use crate::identify::options::Options;
-use crate::identify::result::Refutation;
-use crate::identify::result::{AtTNms, Identification, Parameter, Parameters, STANDARD_NORMAL_95};
+use crate::identify::result::{
+    AtTNms, Identification, Parameter, Parameters, Refutation, STANDARD_NORMAL_95,
+};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
 use crate::identify::verdict;
 
@@ -125,9 +126,8 @@ impl Problem<'_> {
             });
         }
         let change = found.constancy.as_ref().and_then(|c| c.change.clone());
-        let sensor = change
-            .as_ref()
-            .and_then(|c| self.changed_sensor(c, options.manual));
+        let staying = change.as_ref().filter(|c| c.shape != Shape::Swing);
+        let sensor = staying.and_then(|c| self.changed_sensor(c, options.manual));
         if sensor.is_none() {
             let balance = found.balance.iter();
             refuted.extend(balance.flat_map(|b| verdict::of_balance(b, options.assisted)));
@@ -172,9 +172,7 @@ impl Problem<'_> {
                     .to_owned(),
             );
         }
-        found
-            .notes
-            .extend(self.hidden_gain_2(&mut found.parameters.gain_2));
+        found.notes.extend(hidden_gain_2(&mut found.parameters.gain_2));
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
             Some(inertia) => format!(
@@ -281,20 +279,14 @@ impl Problem<'_> {
         let [low, high] = T_NMS_RANGE_S;
         let about = |place: usize| self.assumed.iter().find(|a| a.place == place);
         let mut out = Vec::new();
-        if !self.is_free(T_NMS) {
-            out.push(match about(T_NMS) {
+        let of_arms = format!(" (arms have {low} to {high} s)");
+        let muscle = [(T_NMS, "t_nms", "s", &*of_arms), (K_NMS, "K_nms", "N.m/rad", "")];
+        for (place, name, unit, usual) in muscle.into_iter().filter(|m| !self.is_free(m.0)) {
+            out.push(match about(place) {
                 Some(Assumed { value, sd, .. }) => {
-                    format!("t_nms is {value} s, give or take {sd} s (arms have {low} to {high} s): the errors hold that")
+                    format!("{name} is {value} {unit}, give or take {sd} {unit}{usual}: the errors hold that")
                 }
-                None => format!("t_nms is {} s", p[T_NMS]),
-            });
-        }
-        if !self.is_free(K_NMS) {
-            out.push(match about(K_NMS) {
-                Some(Assumed { value, sd, .. }) => {
-                    format!("K_nms is {value} N.m/rad, give or take {sd} N.m/rad: the errors hold that")
-                }
-                None => format!("K_nms is {} N.m/rad", p[K_NMS]),
+                None => format!("{name} is {} {unit}", p[place]),
             });
         }
         if let Some(a) = about(OWN_OFFSET) {
@@ -311,20 +303,6 @@ impl Problem<'_> {
             ));
         }
         out
-    }
-
-    /// A line of the driver's own that is not estimated hides gain_2: one that is told from 0 by less than this many standard errors is not
-    /// called identified.
-    fn hidden_gain_2(&self, gain_2: &mut Parameter) -> Option<String> {
-        let is_target_line = self.assumed.iter().any(|a| a.place == OWN_OFFSET);
-        let (gain, error) = gain_2.estimate.zip(gain_2.standard_error)?;
-        (is_target_line && !gain_2.fixed && gain_2.identified && gain < HIDDEN * error).then(|| {
-            gain_2.estimate = None;
-            gain_2.identified = false;
-            "gain_2 is not told from 0, as where a driver keeps another line than the target line: a longer drive, or --fix line_offset \
-             tells more"
-                .to_owned()
-        })
     }
 
     /// Calls nothing identified that this kind of record does not tell, and says why.
@@ -470,38 +448,50 @@ impl Problem<'_> {
     }
 }
 
+/// A line of the driver's own hides gain_2, or takes its place: one that is told from 0 by less than this many standard errors is not
+/// called identified.
+fn hidden_gain_2(gain_2: &mut Parameter) -> Option<String> {
+    let (gain, error) = gain_2.estimate.zip(gain_2.standard_error)?;
+    (!gain_2.fixed && gain_2.identified && gain < HIDDEN * error).then(|| {
+        gain_2.estimate = None;
+        gain_2.identified = false;
+        "gain_2 is not told from 0, as where a driver keeps another line than the target line: a longer drive, or --fix line_offset \
+         tells more"
+            .to_owned()
+    })
+}
+
 /// What the tests of the driver's constancy and of the sensors see, and what they do not.
 fn power_of(found: &Identification) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(constancy) = &found.constancy {
         let of = |pick: fn(&Power) -> Option<f64>| -> String {
             let seen = constancy.power.iter().filter_map(|p| {
-                let least = pick(p);
-                Some(match p.parameter {
-                    "k_hg" => least
-                        .filter(|x| *x < 1.0)
-                        .map_or("no k_hg".to_owned(), |x| format!("k_hg by {x:.2}")),
-                    "k_d" => least
-                        .filter(|x| *x < 1.0)
-                        .map_or("no gains".to_owned(), |x| format!("gains by {:.0} %", 100.0 * x)),
-                    "t_p" => least
-                        .filter(|x| *x < 0.6)
-                        .map_or("no t_p".to_owned(), |x| format!("t_p by {x:.2} s")),
+                let (name, most, scale, digits, unit) = match p.parameter {
+                    "k_d" => ("gains", 1.0, 100.0, 0, " %"),
+                    "gain_1" => ("gain_1 alone", 2.0, 1.0, 2, " N.m/m"),
+                    "k_hg" => ("k_hg", 1.0, 1.0, 2, ""),
+                    "t_p" => ("t_p", 0.6, 1.0, 2, " s"),
                     _ => return None,
-                })
+                };
+                let least = pick(p).filter(|x| *x < most);
+                let shown = |x: f64| format!("{name} by {:.digits$}{unit}", scale * x);
+                Some(least.map_or(format!("no {name}"), shown))
             });
             seen.collect::<Vec<_>>().join(", ")
         };
-        let blind = constancy
-            .power
-            .iter()
-            .all(|p| p.step.is_none_or(|x| x > 0.5 || p.parameter == "t_p" && x > 0.3));
+        let seen = |key: &str, most: f64| {
+            let mut of_key = constancy.power.iter().filter(|p| p.parameter == key);
+            of_key.any(|p| p.step.is_some_and(|x| x <= most))
+        };
+        let blind = !(seen("k_hg", 0.5) || seen("k_d", 0.5) || seen("t_p", 0.3));
         out.push(format!(
-            "the driver is the same throughout{}: of nine changes in ten, one that stays is seen from here on ({}), and one of {BLIP_S} \
-             s ({})",
+            "the driver is the same throughout{}: of nine changes in ten, one that stays is seen from here on ({}), one of {BLIP_S} \
+             s ({}), and one to and fro each {SWING_S} s ({})",
             if blind { ", which this drive is too short to tell" } else { "" },
             of(|p| p.step),
             of(|p| p.blip),
+            of(|p| p.swing),
         ));
     }
     let too_little = match &found.balance {
@@ -541,6 +531,32 @@ mod tests {
     use super::*;
     use crate::identify::log::DriveLog;
     use crate::identify::prepare::prepare;
+
+    /// A gain_2 of 0.001 +- 0.002 is not called identified, whether a line is estimated beside it or not; one of 0.005, a given one and one
+    /// that was not identified stay as they are.
+    #[test]
+    fn a_gain_2_that_is_not_told_from_0_is_hidden() {
+        let found = |gain: f64, fixed, identified| Parameter {
+            estimate: Some(gain),
+            standard_error: Some(0.002),
+            identified,
+            fixed,
+            ..Parameter::ABSENT
+        };
+        for (mut gain_2, hidden) in [
+            (found(0.001, false, true), true),
+            (found(0.005, false, true), false),
+            (found(0.001, true, true), false),
+            (found(0.001, false, false), false),
+        ] {
+            let was = gain_2;
+            assert_eq!(hidden_gain_2(&mut gain_2).is_some(), hidden);
+            assert_eq!(
+                gain_2.identified && gain_2.estimate.is_some(),
+                !hidden && was.identified
+            );
+        }
+    }
 
     /// A parabola of standard error 0.05 about 0.2 passes 3.841 at 0.2 -+ 1.96 * 0.05, whatever the points; cut off at 0.15, it
     /// ends there.

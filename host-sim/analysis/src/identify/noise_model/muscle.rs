@@ -4,8 +4,7 @@ use nalgebra::DMatrix;
 
 use super::evidence::Alternative;
 use super::{Assumed, K_NMS, NAMES, Problem, T_NMS, T_NMS_RANGE_S};
-use crate::identify::result::Identification;
-use crate::identify::result::Refutation;
+use crate::identify::result::{Identification, Refutation};
 use crate::identify::verdict;
 
 /// By so much t_nms may be outside of the range of arms all the same, s: the range is of rounded figures.
@@ -62,25 +61,26 @@ impl Problem<'_> {
             // One that the record does not tell well is held by what is assumed, and must be surely beyond.
             let sure = if error < TOLD_S { error } else { SURELY * error };
             if a.place == T_NMS && beyond > ROUNDING_S.max(sure) {
+                let (cause, cure) = if drawn < low {
+                    (
+                        "the steering wheel turns between the hands and the sensor (a torsion bar below the wheel), or a \
+                         torque is late",
+                        "--wheel-inertia J with the wheel's inertia, kg.m2 (0.03 to 0.05 is usual); --fix t_nms=VALUE if it \
+                         is known",
+                    )
+                } else {
+                    (
+                        "a torque sensor is filtered or late, or the driver is another one",
+                        "--estimate t_d_late or t_h_late; --fix t_nms=VALUE if it is known",
+                    )
+                };
                 let refutation = Refutation {
                     assumption: "t_nms is that of an arm",
                     evidence: format!(
                         "it would have to be {drawn:.3} +- {error:.3} s; arms have {low} to {high} s"
                     ),
-                    cause: if drawn < low {
-                        "the steering wheel turns between the hands and the sensor (a torsion bar below the wheel), or a \
-                         torque is late"
-                            .to_owned()
-                    } else {
-                        "a torque sensor is filtered or late, or the driver is another one".to_owned()
-                    },
-                    cure: if drawn < low {
-                        "--wheel-inertia J with the wheel's inertia, kg.m2 (0.03 to 0.05 is usual); --fix t_nms=VALUE if it \
-                         is known"
-                            .to_owned()
-                    } else {
-                        "--estimate t_d_late or t_h_late; --fix t_nms=VALUE if it is known".to_owned()
-                    },
+                    cause: cause.to_owned(),
+                    cure: cure.to_owned(),
                 };
                 out.push(((beyond / error).powi(2).max(REFUTES), refutation));
             }

@@ -3,6 +3,8 @@
 
 use serde::Serialize;
 
+use crate::identify::wide::median;
+
 /// What was found in one column, in samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ColumnFaults {
@@ -84,14 +86,6 @@ pub(super) fn bridge(signal: &mut [f64], bad: &[bool]) {
         }
         k = end.unwrap_or(n);
     }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// The median of so many of each number.

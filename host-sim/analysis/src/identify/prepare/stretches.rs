@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::identify::lane::LaneNoise;
 use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
+use crate::identify::wide::{median, running_mean};
 
 /// Why a stretch was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -213,32 +214,14 @@ fn standstill(log: &DriveLog, noise: [LaneNoise; 2], rows: usize) -> Vec<Range<u
         .collect()
 }
 
-/// The mean of so many rows to both sides.
-fn averaged(signal: &[f64], half: usize) -> Vec<f64> {
-    let mean = |k: usize| {
-        let near = &signal[k.saturating_sub(half)..(k + half + 1).min(signal.len())];
-        near.iter().sum::<f64>() / near.len() as f64
-    };
-    (0..signal.len()).map(mean).collect()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 /// Standard deviation of a signal's noise: of three rows the middle one lies beside the mean of the others, in the median.
 fn noise_of(signal: &[f64]) -> f64 {
-    let beside: Vec<f64> = signal
+    let mut beside: Vec<f64> = signal
         .windows(3)
         .map(|w| (w[1] - 0.5 * (w[0] + w[2])).abs())
         .collect();
     // Two thirds of the variance of such a difference are the middle row's; 1.4826 makes a standard deviation of a median.
-    if beside.is_empty() {
-        0.0
-    } else {
-        1.4826 * (2.0_f64 / 3.0).sqrt() * median(beside)
-    }
+    1.4826 * (2.0_f64 / 3.0).sqrt() * median(&mut beside)
 }
 
 /// Hands are off where the torque is quiet near zero although there was something to steer, or for long in a drive whose
@@ -249,10 +232,7 @@ fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
         .chunks_exact(rows.max(1))
         .map(|c| c.iter().fold(f64::MIN, |a, &b| a.max(b)) - c.iter().fold(f64::MAX, |a, &b| a.min(b)))
         .collect();
-    usual.sort_by(f64::total_cmp);
-    let restless = usual
-        .get(usual.len() / 2)
-        .is_some_and(|&u| u > RESTLESS * HANDS_OFF_NM);
+    let restless = median(&mut usual) > RESTLESS * HANDS_OFF_NM;
     let torque = &log.driver_torque_nm;
     let noise_nm = noise_of(torque);
     let [least, most] = HANDS_NOISE_S.map(|s| (s / log.dt_s) as usize);
@@ -262,9 +242,9 @@ fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
     } else {
         needed.clamp(least, most)
     };
-    let mean = averaged(torque, half);
+    let mean = running_mean(torque, half);
     let mut still = quiet(&mean, HANDS_OFF_NM, rows);
-    let offset = median(torque.clone());
+    let offset = median(&mut torque.clone());
     for (still, mean) in still.iter_mut().zip(&mean) {
         *still &= mean.abs().min((mean - offset).abs()) <= HANDS_OFF_OFFSET_NM;
     }
