@@ -289,7 +289,7 @@ impl DriveLog {
     }
 
     /// Keeps what the record says of the speed.
-    pub(crate) fn tell_speed(&mut self, speeds_m_per_s: &[f64]) {
+    pub fn tell_speed(&mut self, speeds_m_per_s: &[f64]) {
         let known = || speeds_m_per_s.iter().copied().filter(|v| v.is_finite());
         self.speeds_m_per_s = known()
             .reduce(f64::min)
