@@ -81,7 +81,7 @@ const PACKAGES: Arrows = &[
     ("core/diag", &["haptic-core"]),
     ("core/secoc", &["haptic-core"]),
     ("firmware", &["haptic-core", "haptic-diag", "haptic-lockstep", "haptic-secoc"]),
-    ("firmware/lockstep", &["haptic-core"]),
+    ("firmware/lockstep", &["haptic-core", "haptic-secoc"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
     ("host-sim/column", &["haptic-core", "haptic-sim"]),

@@ -27,7 +27,7 @@ use haptic_core::safety::faults::{Fault, FaultSet};
 use haptic_core::service::rejections::Rejections;
 use haptic_diag::trouble::Cells;
 use haptic_secoc::messages::State;
-use haptic_secoc::verifier::{Credentials, Verifier};
+use haptic_secoc::verifier::{Credentials, Passed, Verifier};
 
 use crate::boards::{Board, ThisBoard};
 use crate::service::{Origin, Restart, Service};
@@ -117,6 +117,13 @@ pub fn run(
             disturb(ecu, boot, counts.steps);
             step(&mut board, ecu, service, verifier, cells, &mut counts);
         }
+        // Behind the step, which no MAC delays.
+        let start = ThisBoard::cycles();
+        while let Some(passed) = verifier.verified() {
+            hear(passed, ecu, service, &mut counts);
+        }
+        let cycles = ThisBoard::cycles().wrapping_sub(start);
+        counts.receiving = counts.receiving.wrapping_add(cycles);
     }
 }
 
@@ -144,20 +151,22 @@ fn receive(
             continue;
         }
         let start = ThisBoard::cycles();
-        let passed = verifier.receive(&frame, ThisBoard::now());
-        let received = passed.map(|(frame, at)| ecu.receive(&frame, at));
+        if let Some(passed) = verifier.receive(&frame, ThisBoard::now()) {
+            hear(passed, ecu, service, counts);
+        }
         let cycles = ThisBoard::cycles().wrapping_sub(start);
         counts.receiving = counts.receiving.wrapping_add(cycles);
-        let Some((frame, _)) = passed else {
-            continue;
-        };
-        if let Some(Err(reason)) = received {
-            counts.rejected.count(frame.id(), reason);
-        }
-        if let Some(set) = service.receive(&frame, ecu, counts.steps) {
-            ThisBoard::zero_torque();
-            reset::restart_with(&set);
-        }
+    }
+}
+
+/// Hands on what may command.
+fn hear((frame, at): Passed, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
+    if let Err(reason) = ecu.receive(&frame, at) {
+        counts.rejected.count(frame.id(), reason);
+    }
+    if let Some(set) = service.receive(&frame, ecu, counts.steps) {
+        ThisBoard::zero_torque();
+        reset::restart_with(&set);
     }
 }
 

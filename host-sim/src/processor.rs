@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use haptic_core::quantity::Instant;
 use haptic_lockstep::{Start, StartState};
 
+use haptic_pil::cost::Drive;
 use haptic_pil::{Pil, PilError, Report, Target};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::scenario::{Condition, Scenario, Sensors};
@@ -32,21 +33,7 @@ pub fn run(
     target: &Target,
     mut progress: impl FnMut(u32) -> ControlFlow<()>,
 ) -> Result<Report, ProcessorError> {
-    scenario
-        .check_times()
-        .map_err(|e| ProcessorError::Scenario(e.to_string()))?;
-    if scenario.condition() == Condition::Manual {
-        return Err(ProcessorError::Scenario(
-            "condition = \"manual\" has no controller whose frames could be compared; use high, mid or low"
-                .into(),
-        ));
-    }
-    if scenario.sensors() == Sensors::Exact {
-        return Err(ProcessorError::Scenario(
-            "sensors = \"exact\" goes past the bus, whose frames are to be compared; use sensors = \"paper\""
-                .into(),
-        ));
-    }
+    check(scenario)?;
     let params = scenario.controller_params();
     let start = Start {
         state: StartState::Engaged,
@@ -63,4 +50,40 @@ pub fn run(
         }
     }
     pil.finish().map_err(ProcessorError::Target)
+}
+
+/// What the ECU of a scenario hears, tick by tick.
+///
+/// # Errors
+/// As [`run`], a target apart.
+pub fn record(scenario: &Scenario) -> Result<Drive, ProcessorError> {
+    check(scenario)?;
+    let mut ticks = Vec::new();
+    let mut simulation = Simulation::with(scenario, OverBus::new(scenario.setup()));
+    while let Some(outcome) = simulation.step(&Action::default()) {
+        ticks.push((outcome.observation.now(), outcome.frames_in.to_vec()));
+    }
+    Ok(Drive {
+        params: scenario.controller_params(),
+        ticks,
+    })
+}
+
+fn check(scenario: &Scenario) -> Result<(), ProcessorError> {
+    scenario
+        .check_times()
+        .map_err(|e| ProcessorError::Scenario(e.to_string()))?;
+    if scenario.condition() == Condition::Manual {
+        return Err(ProcessorError::Scenario(
+            "condition = \"manual\" has no controller whose frames could be compared; use high, mid or low"
+                .into(),
+        ));
+    }
+    if scenario.sensors() == Sensors::Exact {
+        return Err(ProcessorError::Scenario(
+            "sensors = \"exact\" goes past the bus, whose frames are to be compared; use sensors = \"paper\""
+                .into(),
+        ));
+    }
+    Ok(())
 }

@@ -62,6 +62,15 @@ impl Board {
         }
     }
 
+    /// Where the page of keys begins; None where QEMU is the board. A test compares it with the memory map.
+    pub(crate) const fn keys_at(self) -> Option<u32> {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => None,
+            Self::NucleoG474re | Self::NucleoG474reSensors => Some(0x0807_D800),
+            Self::SamE54Xpro => Some(0x000F_6000),
+        }
+    }
+
     /// Builds an image. QEMU's is for the bench (`firmware/Cargo.toml`); a board's product is sealed.
     pub(crate) fn build(self, image: Image) -> Result<PathBuf> {
         let elf = image::elf_of(&mut image::build_command(image.bin(), M4F, &self.features()))?;
@@ -251,7 +260,37 @@ fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
     let mut figures = quiet.figures("");
     figures.extend(activity.figures(", driver activity"));
     figures.push(figure("worst step, any example", "instructions", worst, 1));
+    if board == Board::Mps2An386 {
+        figures.extend(with_keys(built)?);
+    }
     Ok(figures)
+}
+
+/// What authentication takes, in the drive whose steps take most.
+fn with_keys(built: Built) -> Result<Vec<Figure>> {
+    let mut cost = tool::command(&built.host_sim()?.to_string_lossy());
+    let text = tool::output(cost.args(["ecu", "cost", "--json", EVENTFUL[0]]))?;
+    let costs: Value = serde_json::from_str(&text).context("host-sim ecu cost --json")?;
+    let drives = costs["drives"]
+        .as_array()
+        .context("host-sim ecu cost drove nothing")?;
+    let mut named = Vec::new();
+    for drive in drives.iter().skip(1) {
+        let what = drive["what"].as_str().unwrap_or_default();
+        named.push((format!("worst step, {what}"), &drive["worst"]));
+        named.push((format!("worst tick, {what}"), &drive["worst_tick"]));
+    }
+    for (mac, name) in [("siphash", "SipHash-2-4"), ("aes", "AES-CMAC")] {
+        named.push((format!("a true lane preview, {name}"), &costs[mac]["taken"]));
+        named.push((format!("a false lane preview, {name}"), &costs[mac]["refused"]));
+    }
+    let counted = named.into_iter().map(|(name, value)| {
+        let value = value
+            .as_u64()
+            .with_context(|| format!("host-sim ecu cost counted no {name}"))?;
+        Ok(figure(&name, "instructions", value, 1))
+    });
+    counted.collect()
 }
 
 /// What a drive takes.

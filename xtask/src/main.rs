@@ -21,6 +21,7 @@ mod gate;
 mod golden;
 mod identify;
 mod image;
+mod keys;
 mod lines;
 mod logs;
 mod longest;
@@ -101,6 +102,8 @@ enum Command {
     Flash(boards::Options),
     /// Writes an image to a board, runs it and prints its log (needs probe-rs).
     Run(boards::Options),
+    /// Makes the page of keys of a board's flash, by chance or from a file: HEX, S19 and bytes, to write beside the image.
+    Keys(keys::Options),
     /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
     Hil(boards::Hil),
     /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++ and to the
@@ -178,6 +181,7 @@ fn main() -> ExitCode {
         Command::Boards { bless } => boards::check(boards::Scope::All, Built::ToShip, bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
+        Command::Keys(options) => keys::make(&options),
         Command::Hil(options) => boards::hil(&options),
         Command::C => c_library::check(Built::ToShip),
         Command::Fmu => fmu::check(Built::ToShip),

@@ -12,56 +12,121 @@
 
 use core::hash::Hasher;
 
-use aes::Aes128;
-use cmac::Mac as _;
+use aes::cipher::{BlockEncrypt, KeyInit};
+use aes::{Aes128, Block};
 use heapless::Vec;
 use siphasher::sip::SipHasher24;
 
 /// A key of either MAC.
 pub type Key = [u8; 16];
 
-/// The longest payload.
-pub const LONGEST: usize = 64;
 /// Epochs of one start; each is used up by a sender's good frame alone.
 pub const EPOCHS: u32 = 1 << 12;
-/// What is authenticated: the purpose, identifier, epoch, count, payload.
-type Text = Vec<u8, { LONGEST + 11 }>;
+/// Bytes of a block of AES.
+const BLOCK: usize = 16;
+/// Bytes in front of a payload.
+const HEAD: usize = 11;
+
+/// What is authenticated: purpose, identifier, epoch and count, then the payload.
+#[derive(Debug, Clone, Copy)]
+pub struct Text<'a> {
+    /// In front of the payload.
+    pub head: [u8; HEAD],
+    /// The payload.
+    pub payload: &'a [u8],
+}
 
 /// A MAC, of which the first 32 bits are used.
 pub trait Mac {
     /// The first 32 bits.
-    fn tag(&self, text: &[u8]) -> u32;
+    fn tag(&self, text: &Text<'_>) -> u32;
+
+    /// Which of the texts, which are equally long, has a tag that is wanted.
+    fn find(&self, texts: &[Text<'_>], is_wanted: impl Fn(u32) -> bool) -> Option<usize> {
+        texts.iter().position(|text| is_wanted(self.tag(text)))
+    }
 }
 
-/// AES-CMAC (RFC 4493), its round keys worked out once.
+/// AES-CMAC (RFC 4493), its round keys and both subkeys worked out once. Two texts take as long as one, because the cipher works on two
+/// blocks at a time; the crate `cmac` takes one text at a time, and a third block for the subkeys of each.
 #[derive(Clone)]
-pub struct Cmac(cmac::Cmac<Aes128>);
+pub struct Cmac {
+    cipher: Aes128,
+    /// For a last block that is whole, and for one that is filled up.
+    subkeys: [u128; 2],
+}
 
 impl Cmac {
     /// The MAC under a key.
     #[must_use]
     pub fn new(key: &Key) -> Self {
-        Self(cmac::Mac::new(key.into()))
+        let cipher = Aes128::new(key.into());
+        let mut block = Block::default();
+        cipher.encrypt_block(&mut block);
+        let doubled = |number: u128| (number << 1) ^ (number >> 127).wrapping_mul(0x87);
+        let whole = doubled(u128::from_be_bytes(block.into()));
+        Self {
+            cipher,
+            subkeys: [whole, doubled(whole)],
+        }
+    }
+
+    /// The tags of texts that are as long as the first.
+    fn tags<const N: usize>(&self, texts: [&Text<'_>; N]) -> [u32; N] {
+        let length = texts
+            .first()
+            .map_or(HEAD, |text| text.payload.len().saturating_add(HEAD));
+        let mut texts = texts.map(|text| text.head.iter().chain(text.payload));
+        let mut blocks = [Block::default(); N];
+        let [whole, filled] = self.subkeys;
+        for from in (0..length).step_by(BLOCK) {
+            let here = length.saturating_sub(from);
+            let subkey = match here {
+                0..BLOCK => filled,
+                BLOCK => whole,
+                _ => 0,
+            };
+            for (block, text) in blocks.iter_mut().zip(&mut texts) {
+                let mut bytes = [0; BLOCK];
+                bytes.iter_mut().zip(text).for_each(|(to, from)| *to = *from);
+                if let Some(end) = bytes.get_mut(here) {
+                    *end = 0x80;
+                }
+                let number = u128::from_be_bytes((*block).into()) ^ u128::from_be_bytes(bytes) ^ subkey;
+                *block = number.to_be_bytes().into();
+            }
+            self.cipher.encrypt_blocks(&mut blocks);
+        }
+        blocks.map(|block| {
+            let [a, b, c, d, ..] = <[u8; BLOCK]>::from(block);
+            u32::from_be_bytes([a, b, c, d])
+        })
     }
 }
 
 impl Mac for Cmac {
-    fn tag(&self, text: &[u8]) -> u32 {
-        let mut mac = self.0.clone();
-        mac.update(text);
-        let [a, b, c, d, ..] = <[u8; 16]>::from(mac.finalize().into_bytes());
-        u32::from_be_bytes([a, b, c, d])
+    fn tag(&self, text: &Text<'_>) -> u32 {
+        let [tag] = self.tags([text]);
+        tag
+    }
+
+    fn find(&self, texts: &[Text<'_>], is_wanted: impl Fn(u32) -> bool) -> Option<usize> {
+        match texts {
+            [first, second] => self.tags([first, second]).into_iter().position(is_wanted),
+            _ => texts.iter().position(|text| is_wanted(self.tag(text))),
+        }
     }
 }
 
-/// SipHash-2-4, a thirtieth of the work.
+/// SipHash-2-4, a fraction of the work.
 #[derive(Debug, Clone)]
 pub struct SipHash(pub Key);
 
 impl Mac for SipHash {
-    fn tag(&self, text: &[u8]) -> u32 {
+    fn tag(&self, text: &Text<'_>) -> u32 {
         let mut hasher = SipHasher24::new_with_key(&self.0);
-        hasher.write(text);
+        hasher.write(&text.head);
+        hasher.write(text.payload);
         let [a, b, c, d, ..] = hasher.finish().to_le_bytes();
         u32::from_be_bytes([a, b, c, d])
     }
@@ -101,10 +166,17 @@ impl Chosen {
 }
 
 impl Mac for Chosen {
-    fn tag(&self, text: &[u8]) -> u32 {
+    fn tag(&self, text: &Text<'_>) -> u32 {
         match self {
             Self::SipHash(mac) => mac.tag(text),
             Self::AesCmac(mac) => mac.tag(text),
+        }
+    }
+
+    fn find(&self, texts: &[Text<'_>], is_wanted: impl Fn(u32) -> bool) -> Option<usize> {
+        match self {
+            Self::SipHash(mac) => mac.find(texts, is_wanted),
+            Self::AesCmac(mac) => mac.find(texts, is_wanted),
         }
     }
 }
@@ -134,16 +206,14 @@ enum Purpose {
     Offer = 2,
 }
 
-/// A text of a purpose; None where the payload is too long.
+/// A text of a purpose.
 #[expect(clippy::as_conversions, reason = "the code of a variant")]
-fn text(purpose: Purpose, id: u16, epoch: u32, number: u32, payload: &[u8]) -> Option<Text> {
-    let mut text = Text::new();
-    text.push(purpose as u8).ok()?;
-    text.extend_from_slice(&id.to_be_bytes()).ok()?;
-    text.extend_from_slice(&epoch.to_be_bytes()).ok()?;
-    text.extend_from_slice(&number.to_be_bytes()).ok()?;
-    text.extend_from_slice(payload).ok()?;
-    Some(text)
+const fn text(purpose: Purpose, id: u16, epoch: u32, number: u32, payload: &[u8]) -> Text<'_> {
+    let ([a, b], [c, d, e, f], [g, h, i, j]) = (id.to_be_bytes(), epoch.to_be_bytes(), number.to_be_bytes());
+    Text {
+        head: [purpose as u8, a, b, c, d, e, f, g, h, i, j],
+        payload,
+    }
 }
 
 fn cut(tag: u32, bits: u32) -> u32 {
@@ -195,8 +265,8 @@ impl<M: Mac, const BITS: u32, const TAG: u32> Sender<M, BITS, TAG> {
         let Some(question) = self.question else {
             return;
         };
-        let is_true = text(Purpose::Offer, self.id, offer.epoch, question, &[])
-            .is_some_and(|text| cut(self.mac.tag(&text), TAG) == offer.tag);
+        let text = text(Purpose::Offer, self.id, offer.epoch, question, &[]);
+        let is_true = cut(self.mac.tag(&text), TAG) == offer.tag;
         if is_true && self.epoch != Some(offer.epoch) {
             (self.epoch, self.count) = (Some(offer.epoch), 0);
         }
@@ -205,10 +275,10 @@ impl<M: Mac, const BITS: u32, const TAG: u32> Sender<M, BITS, TAG> {
         }
     }
 
-    /// The proof of the next frame; None without an epoch, at its end, or with a payload that is too long.
+    /// The proof of the next frame; None without an epoch, or at its end.
     pub fn prove(&mut self, payload: &[u8]) -> Option<Proof> {
         let count = self.count.checked_add(1)?;
-        let text = text(Purpose::Frame, self.id, self.epoch?, count, payload)?;
+        let text = text(Purpose::Frame, self.id, self.epoch?, count, payload);
         self.count = count;
         Some(Proof {
             count: low(count, BITS),
@@ -251,8 +321,8 @@ impl<const BITS: u32, const TAG: u32> Receiver<BITS, TAG> {
     /// Answers a sender's question; None when the start's epochs are used up.
     #[must_use]
     pub fn offer(&self, mac: &impl Mac, question: u32) -> Option<Offer> {
-        let text = text(Purpose::Offer, self.id, self.offered, question, &[]).filter(|_| self.left > 0)?;
-        Some(Offer {
+        let text = text(Purpose::Offer, self.id, self.offered, question, &[]);
+        (self.left > 0).then(|| Offer {
             epoch: self.offered,
             tag: cut(mac.tag(&text), TAG),
         })
@@ -261,30 +331,31 @@ impl<const BITS: u32, const TAG: u32> Receiver<BITS, TAG> {
     /// Whether a frame is the sender's, and fresh: newer than every one before. At most 2^`BITS` - 2 frames may be lost between two;
     /// a sender that is refused after more of them asks anew.
     pub fn accept(&mut self, mac: &impl Mac, payload: &[u8], proof: &Proof) -> bool {
-        if let Some((epoch, last)) = self.used
-            && let Some(count) = self.next(mac, epoch, last, payload, proof)
-        {
-            self.used = Some((epoch, count));
-            return true;
+        let offered = (self.left > 0).then_some((self.offered, 0));
+        let (mut nexts, mut texts) = (Vec::<_, 2>::new(), Vec::<_, 2>::new());
+        for (epoch, last) in self.used.into_iter().chain(offered) {
+            if let Some((count, text)) = self.next(epoch, last, payload, proof) {
+                // A place for each epoch.
+                let _ = (nexts.push((epoch, count)), texts.push(text));
+            }
         }
-        if self.left == 0 {
-            return false;
-        }
-        let Some(count) = self.next(mac, self.offered, 0, payload, proof) else {
+        let found = mac.find(&texts, |tag| cut(tag, TAG) == proof.tag);
+        let Some((epoch, count)) = found.and_then(|place| nexts.get(place).copied()) else {
             return false;
         };
-        self.used = Some((self.offered, count));
-        (self.offered, self.left) = (self.offered.wrapping_add(1), self.left.saturating_sub(1));
+        if self.used.is_none_or(|(used, _)| used != epoch) {
+            (self.offered, self.left) = (self.offered.wrapping_add(1), self.left.saturating_sub(1));
+        }
+        self.used = Some((epoch, count));
         true
     }
 
-    /// The count of a frame of an epoch, behind the last one.
-    fn next(&self, mac: &impl Mac, epoch: u32, last: u32, payload: &[u8], proof: &Proof) -> Option<u32> {
+    /// The count that a frame of an epoch has behind the last one, and what its MAC is over.
+    fn next<'a>(&self, epoch: u32, last: u32, payload: &'a [u8], proof: &Proof) -> Option<(u32, Text<'a>)> {
         let ahead = low(u32::from(proof.count).wrapping_sub(last), BITS);
         // The last one again, or so many were lost that it cannot be told.
         let count = last.checked_add(u32::from(ahead)).filter(|_| ahead > 0)?;
-        let text = text(Purpose::Frame, self.id, epoch, count, payload)?;
         let is_whole = low(count, BITS) == proof.count;
-        (is_whole && cut(mac.tag(&text), TAG) == proof.tag).then_some(count)
+        is_whole.then(|| (count, text(Purpose::Frame, self.id, epoch, count, payload)))
     }
 }

@@ -143,7 +143,7 @@ pub enum Refusal {
     NoFrame,
     /// Not as long as it is.
     Length,
-    /// More than a step may verify.
+    /// More than can wait to be verified.
     TooMany,
     /// Under an identifier of this ECU.
     Foreign,

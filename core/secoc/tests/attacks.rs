@@ -165,7 +165,11 @@ fn run(what: Option<Attack>, algorithm: Option<Algorithm>) -> (Vec<Frame>, u32, 
         // The column is not proven: what it said is not said again, as it would be believed.
         said.extend(own.iter().filter(|frame| frame.id() != Column::ID));
         for frame in first.iter().chain(&own).chain(&last) {
-            if let Some((frame, at)) = verifier.receive(frame, now) {
+            let passed = verifier.receive(frame, now);
+            for (frame, at) in passed
+                .into_iter()
+                .chain(std::iter::from_fn(|| verifier.verified()))
+            {
                 let _ = ecu.receive(&frame, at);
             }
         }
@@ -240,6 +244,7 @@ fn a_frame_before_each_proof_costs_the_input_and_nothing_else() {
         assert_eq!(verifier.receive(&frame, now), None);
         assert_eq!(verifier.receive(&lane(-4.0).encode(count), now), None);
         assert_eq!(verifier.receive(&proof, now), None);
+        assert_eq!(verifier.verified(), None);
         verifier.step(0);
     }
     assert_eq!(verifier.total() - refused, 200);

@@ -43,7 +43,8 @@ fn another_program_makes_the_same_frames() {
             ("bus", _) => {
                 assert_eq!(expected.pop_front(), Some(frame));
                 let heard = if is_synchronised || frame.id() >= 0x500 {
-                    verifier.receive(&frame, Instant::from_us(0))
+                    let passed = verifier.receive(&frame, Instant::from_us(0));
+                    passed.or_else(|| verifier.verified())
                 } else {
                     None
                 };

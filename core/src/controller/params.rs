@@ -46,6 +46,8 @@ pub const DRIVER_ACTIVITY: f64 = 1.0;
 pub const SENSORS: [&str; 3] = ["hands", "bar_and_column_angle", "bar_and_wheel_angle"];
 /// [`Params::torque_sensor`] of a bar beside the angle of its column.
 pub const BAR_AND_COLUMN_ANGLE: f64 = 1.0;
+/// [`Params::torque_sensor`] of a bar beside the angle of its wheel.
+pub const BAR_AND_WHEEL_ANGLE: f64 = 2.0;
 
 /// [`ParamError::unit`] of a parameter that has to be a whole number.
 pub const WHOLE: &str = "in whole numbers";

@@ -19,6 +19,7 @@ use haptic_core::controller::params::{self, ParamError, Params};
 use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::quantity::Instant;
 use haptic_core::safety::faults::FaultSet;
+use haptic_secoc::fresh::Algorithm;
 
 /// The simulated time, which ends a tick: the ECU steps when it arrives. Not protected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -196,12 +197,42 @@ impl Start {
     }
 }
 
+/// From now on, what commands the ECU needs a proof under the keys that everybody knows, and is verified behind the step, as a product does
+/// it. A run as [`StartState::Product`] takes no note of it. Not protected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Authenticated(pub Algorithm);
+
+impl Authenticated {
+    /// Identifier.
+    const ID: u16 = 0x7F3;
+
+    /// Byte 0: 1 SipHash-2-4, 2 AES-CMAC.
+    #[must_use]
+    pub fn encode(self) -> Frame {
+        let code = match self.0 {
+            Algorithm::SipHash => 1_u64,
+            Algorithm::AesCmac => 2,
+        };
+        Frame::full(Self::ID, code.to_le_bytes())
+    }
+
+    /// The MAC, if this is such a frame and names one.
+    #[must_use]
+    pub fn decode(frame: &Frame) -> Option<Self> {
+        match (frame.id(), frame.full_data()?) {
+            (Self::ID, [1, ..]) => Some(Self(Algorithm::SipHash)),
+            (Self::ID, [2, ..]) => Some(Self(Algorithm::AesCmac)),
+            _ => None,
+        }
+    }
+}
+
 /// What one step cost the target, in cycles of its counter. Ends the answer to a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepCost {
     /// Every `Ecu::receive` of the tick and `Ecu::step`.
     pub cycles: u32,
-    /// `Ecu::background_step`.
+    /// `Ecu::background_step`, and verifying frames.
     pub background_cycles: u32,
 }
 

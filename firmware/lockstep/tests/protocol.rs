@@ -8,9 +8,10 @@ use haptic_core::quantity::{Instant, Micros};
 use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
 use haptic_lockstep::{
-    PARAMETERS, SimTime, StackUse, Start, StartState, StepCost, from_record, parameter_frames, set_parameter,
-    to_record,
+    Authenticated, PARAMETERS, SimTime, StackUse, Start, StartState, StepCost, from_record, parameter_frames,
+    set_parameter, to_record,
 };
+use haptic_secoc::fresh::Algorithm;
 
 fn frame(id: u16, bytes: &[u8]) -> Frame {
     Frame::new(id, bytes).unwrap()
@@ -143,4 +144,16 @@ fn use_of_the_stack() {
     assert_eq!(StackUse::decode(&used.encode()), Some(used));
     assert_eq!(StackUse::decode(&frame(0x7F1, &[0; 8])), None);
     assert_eq!(StackUse::decode(&frame(0x7F2, &[0; 7])), None);
+}
+
+#[test]
+fn which_mac() {
+    for (algorithm, code) in [(Algorithm::SipHash, 1), (Algorithm::AesCmac, 2)] {
+        let expected = frame(0x7F3, &[code, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(Authenticated(algorithm).encode(), expected);
+        assert_eq!(Authenticated::decode(&expected), Some(Authenticated(algorithm)));
+    }
+    for other in [frame(0x7F3, &[0; 8]), frame(0x7F3, &[1]), frame(0x7F2, &[1; 8])] {
+        assert_eq!(Authenticated::decode(&other), None);
+    }
 }

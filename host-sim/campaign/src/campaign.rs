@@ -29,6 +29,9 @@ pub struct Campaign {
     pub limits: Limits,
     /// The first seed.
     pub first_seed: u64,
+    /// Whether the column has a torsion bar, which the limits were not chosen for.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub has_bar: bool,
 }
 
 impl Campaign {
@@ -42,6 +45,7 @@ impl Campaign {
             law: LAWS[0],
             limits: Drivers::Paper.limits(),
             first_seed: 1,
+            has_bar: false,
         }
     }
 
@@ -186,6 +190,7 @@ pub fn run(
         law: world.law(),
         limits: world.drivers().limits(),
         first_seed: seeds.start,
+        has_bar: world.has_bar(),
         ..Campaign::new(rows)
     }
 }

@@ -63,20 +63,35 @@ fn apart_m(simulation: &Trial<'_>, from: &Trial<'_>) -> f64 {
     (y * here.direction_rad.cos() - x * here.direction_rad.sin()).abs()
 }
 
-/// To the end, with the forks beside it if asked for.
-pub(super) fn drive(simulation: &mut Trial<'_>, onset: u32, end: u32, forks: bool) -> Deviation {
+/// To the end, with the forks beside it if asked for. `right` is the fault-free run of a row whose fault is there from the start.
+pub(super) fn drive<'a>(
+    simulation: &mut Trial<'a>,
+    right: Option<Trial<'a>>,
+    onset: u32,
+    end: u32,
+    forks: bool,
+) -> Deviation {
     let mut seen = Deviation::default();
-    let mut healthy: Option<Trial<'_>> = None;
-    let mut dropped: Option<Trial<'_>> = None;
-    let mut cut: Option<Trial<'_>> = None;
+    let mut healthy: Option<Trial<'a>> = None;
+    let mut dropped: Option<Trial<'a>> = None;
+    let mut cut: Option<Trial<'a>> = None;
     let mut edges = [false; 2];
+    let mut right = right;
     loop {
         if forks && simulation.steps() == onset {
-            let twin = healthy.insert(simulation.clone());
+            let twin = healthy.insert(right.take().unwrap_or_else(|| simulation.clone()));
             twin.guidance_mut().end_faults();
             if simulation.guidance().class() == Class::C {
                 cut.insert(twin.clone()).guidance_mut().drop_torque();
             }
+        }
+        if simulation.steps() == onset
+            && let Some(fault) = simulation.guidance().column_fault()
+        {
+            simulation.driver_vehicle_mut().fail(fault);
+        }
+        if let Some(right) = &mut right {
+            step(right, false);
         }
         let left_at = simulation.guidance().left_at();
         let takes_over = left_at.is_some_and(|at| simulation.steps() >= at + NOTICES_MS);

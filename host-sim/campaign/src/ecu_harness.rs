@@ -24,6 +24,7 @@ use super::trial_record::{EcuTrace, Tick, TrialRecord};
 use super::wire::{Arrival, Bus};
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
 use haptic_sim::models::sensors;
+use haptic_sim::models::torsion_bar::ColumnFault;
 use haptic_sim::scenario::Scenario;
 use timing::FaultTiming;
 use witness::Witness;
@@ -89,7 +90,8 @@ impl<'a> EcuHarness<'a> {
                 is_engaged(row.start),
                 scenario.sensor_errors().camera_latency_s > 0.0,
                 clock_base_us,
-            ),
+            )
+            .behind_a_bar(scenario.column().has_bar()),
             witness: Witness::new(
                 row,
                 onset,
@@ -125,6 +127,11 @@ impl<'a> EcuHarness<'a> {
     /// Class of the case.
     pub(super) fn class(&self) -> Class {
         self.row.class
+    }
+
+    /// What of a column with a bar fails at the onset.
+    pub(super) fn column_fault(&self) -> Option<ColumnFault> {
+        self.row.column_fault()
     }
 
     /// Ends every fault of the case.

@@ -5,6 +5,7 @@
 //! *onset*, the first step in which an injection acts.
 
 use haptic_core::ecu::injection::Region;
+use haptic_sim::models::torsion_bar::ColumnFault;
 
 /// What the first injection of a kind says, if there is one.
 macro_rules! first_of {
@@ -198,6 +199,8 @@ pub(super) enum Injection {
     Clock(Clock),
     Inside(Inside),
     Motor(Motor),
+    /// Something of a column with a bar.
+    Column(ColumnFault),
     Hand(Hand),
     Request(RequestFault),
 }

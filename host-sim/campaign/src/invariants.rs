@@ -12,7 +12,7 @@
 //! | wind-up | abs(T) grows by at most 4 N.m/s (2 ms at most count for one cycle) |
 //! | reduction | abs(T) falls by at most 8 N.m/s, 32 in a handover from an implausible lane, but for an ECU fault and a driver who overrides |
 //! | window | abs(T) grows by at most 1.2 N.m within any 250 ms |
-//! | override | the bound that shrinks from 0.8 N.m of opposing driver torque |
+//! | override | the bound that shrinks from 0.8 N.m of opposing driver torque; behind a bar of what its readings of 0.2 s leave of it |
 //! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
 //! | engaging | into Active only from 500 ms of Standby and by a request that rose |
 //! | inputs | no input older than 30 ms in Active, no picture older than a second more, of a late camera 1.35 s |
@@ -40,6 +40,12 @@ const WINDOW_NM: f64 = 1.2;
 const WINDOW_US: u64 = 250_000;
 const OVERRIDE_FROM_NM: f64 = 0.8;
 const OVERRIDE_SLOPE: f64 = 3.0;
+/// Behind a bar: after this time of an observer of 100 rad/s the hands are known. Meanwhile they may be as much more than passes through
+/// the bar as the wheel's friction of 0.1 N.m takes, its damping of 0.05 N.m.s/rad at 2 rad/s and its inertia of 0.044 kg.m2 at 20 rad/s2;
+/// and two frames may change what is known by 50 mN.m; torques that a monitor counts in mN.m, one of them three times, are 5 more.
+const HANDS_KNOWN_US: u32 = 200_000;
+const BAR_MARGIN_NM: f64 = 1.08;
+const BAR_SLACK_NM: f64 = 0.055;
 const TIMEOUT_US: u32 = 30_000;
 /// What an ECU that waits for three periods of a sender may wait longer where frames come up to 25 ms apart from their time.
 const LATE_US: u32 = 8_000;
@@ -114,6 +120,8 @@ pub(super) struct InvariantChecker {
     /// Whether that is so, or a lane preview was ever old when it came.
     camera_is_late: bool,
     driver_nm: f64,
+    /// Behind a bar: its readings of the last [`HANDS_KNOWN_US`], by the ECU's clock; `None` where the sensor measures the hands.
+    bar_nm: Option<VecDeque<(u32, f64)>>,
     request: Option<bool>,
     /// A request that rose and has not yet been used.
     rose: bool,
@@ -141,10 +149,18 @@ impl InvariantChecker {
         }
     }
 
+    /// For an ECU whose sensor is a torsion bar.
+    pub(super) fn behind_a_bar(self, is_bar: bool) -> Self {
+        Self {
+            bar_nm: is_bar.then(VecDeque::new),
+            ..self
+        }
+    }
+
     /// The ECU was reset: what it knew is gone, and its torque with it.
     pub(super) fn reset(&mut self, now_us: u32) {
         let (cycles, violation) = (self.cycles, self.violation.take());
-        *self = Self::new(false, self.camera_lags, now_us);
+        *self = Self::new(false, self.camera_lags, now_us).behind_a_bar(self.bar_nm.is_some());
         (self.cycles, self.violation) = (cycles, violation);
     }
 
@@ -161,6 +177,9 @@ impl InvariantChecker {
             bytes::COLUMN => {
                 self.true_at_us[1] = Some(now_us);
                 self.driver_nm = bytes::signed(frame, 12, 18) as f64 / 4096.0;
+                if let Some(readings) = &mut self.bar_nm {
+                    readings.push_back((now_us, self.driver_nm));
+                }
             }
             bytes::VEHICLE => self.true_at_us[2] = Some(now_us),
             bytes::REQUEST => {
@@ -191,6 +210,12 @@ impl InvariantChecker {
         let is_old = |(at_us, _): &(u32, f64)| now_us.wrapping_sub(*at_us) > KEPT_US;
         while self.outputs.front().is_some_and(is_old) {
             self.outputs.pop_front();
+        }
+        if let Some(readings) = &mut self.bar_nm {
+            let is_old = |(at_us, _): &(u32, f64)| now_us.wrapping_sub(*at_us) > HANDS_KNOWN_US;
+            while readings.len() > 1 && readings.front().is_some_and(is_old) {
+                readings.pop_front();
+            }
         }
     }
 
@@ -271,6 +296,25 @@ impl InvariantChecker {
         Ok(())
     }
 
+    /// The hands' torque that is certain, and the one that is furthest against a torque of this sign, N.m: the sensor's reading, or, behind
+    /// a bar, what its readings of late leave of it.
+    fn hands_nm(&self, sign: f64) -> [f64; 2] {
+        let Some(readings) = &self.bar_nm else {
+            return [self.driver_nm; 2];
+        };
+        let nm = || readings.iter().map(|(_, nm)| *nm);
+        let (least, most) = (
+            nm().fold(f64::INFINITY, f64::min) - BAR_MARGIN_NM,
+            nm().fold(f64::NEG_INFINITY, f64::max) + BAR_MARGIN_NM,
+        );
+        let certain = if least > most {
+            0.0
+        } else {
+            least.max(0.0) + most.min(0.0)
+        };
+        [certain, if sign < 0.0 { most } else { least }]
+    }
+
     fn rates(&self, status: &Status, old_nm: f64, elapsed_s: f64, now_us: u32) -> Result<(), Broken> {
         let elapsed_s = elapsed_s.min(MOST_S);
         let (growth, fall) = (
@@ -288,20 +332,28 @@ impl InvariantChecker {
             });
         }
         let column_is_known = self.true_at_us[1].is_some_and(|at| now_us.wrapping_sub(at) <= TIMEOUT_US);
+        let [certain_nm, against_nm] = self.hands_nm(sign);
         let (low, high) = if column_is_known {
-            override_bounds(self.driver_nm)
+            override_bounds(certain_nm)
         } else {
             (-LIMIT_NM, LIMIT_NM)
         };
-        if !(low - TINY_NM..=high + TINY_NM).contains(&status.torque_nm) {
+        let slack_nm = if self.bar_nm.is_some() { BAR_SLACK_NM } else { 0.0 };
+        let tiny_nm = TINY_NM + slack_nm;
+        if !(low - tiny_nm..=high + tiny_nm).contains(&status.torque_nm) {
             return Err(Broken::Override {
                 torque: status.torque_nm,
                 low,
                 high,
-                driver: self.driver_nm,
+                driver: certain_nm,
             });
         }
-        let bound = if sign < 0.0 { -low } else { high };
+        let bound = match self.bar_nm {
+            None if sign < 0.0 => -low,
+            None => high,
+            Some(_) if !column_is_known => LIMIT_NM,
+            Some(_) => override_bounds(sign * against_nm).1 - slack_nm,
+        };
         let by_driver = new >= bound - LSB_NM - TINY_NM;
         let by_fault = matches!(status.mode, FAULT | LOCKED);
         // Across zero the old torque may fall all the way, and the new one grow from there.
@@ -372,7 +424,14 @@ impl InvariantChecker {
             * match status.mode {
                 HANDOVER if status.faults & COLUMN_IMPLAUSIBLE != 0 => LIED_TO,
                 HANDOVER if status.faults & COLUMN_LOST != 0 => BLIND,
-                HANDOVER if -self.driver_nm * old_nm.signum() > OPPOSES_NM && old_nm != 0.0 => OPPOSED,
+                // Behind a bar nobody outside the ECU knows whether the hands do.
+                HANDOVER
+                    if self.bar_nm.is_none()
+                        && -self.driver_nm * old_nm.signum() > OPPOSES_NM
+                        && old_nm != 0.0 =>
+                {
+                    OPPOSED
+                }
                 _ => 1.0,
             };
         let (torque, old) = (status.torque_nm, old_nm);
@@ -412,5 +471,36 @@ fn reduction_nm_per_s(status: &Status) -> f64 {
         LIE_NM_PER_S
     } else {
         REDUCTION_NM_PER_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sensor of the hands says what they do. Behind a bar 0.2 s of readings from 2.5 to 3 N.m leave a hand of 2.5 - 1.08 N.m
+    /// for certain, and at most one of 3 + 1.08 N.m; readings of both signs, or of less than 1.08 N.m, leave none.
+    #[test]
+    fn readings_of_a_bar_leave_less_for_certain_and_more_against() {
+        let of = |is_bar: bool, readings: &[f64]| {
+            let mut checker = InvariantChecker::new(true, false, 0).behind_a_bar(is_bar);
+            for nm in readings {
+                checker.driver_nm = *nm;
+                if let Some(kept) = &mut checker.bar_nm {
+                    kept.push_back((0, *nm));
+                }
+            }
+            checker
+        };
+        let close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        for sign in [1.0, -1.0] {
+            assert_eq!(of(false, &[-3.0 * sign]).hands_nm(sign), [-3.0 * sign; 2]);
+            let [certain, against] = of(true, &[-3.0 * sign, -2.5 * sign]).hands_nm(sign);
+            close(certain, -1.42 * sign);
+            close(against, -4.08 * sign);
+            close(of(true, &[-3.0 * sign, 0.1 * sign]).hands_nm(sign)[0], 0.0);
+            close(of(true, &[-1.07 * sign]).hands_nm(sign)[0], 0.0);
+        }
     }
 }

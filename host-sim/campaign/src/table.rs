@@ -11,12 +11,14 @@
 
 use std::fmt;
 
+use haptic_core::controller::params::Params;
 use haptic_sim::models::nonlinear::WorldParameters;
+use haptic_sim::models::torsion_bar::ColumnFault;
 use serde::Serialize;
 
 use super::bytes::{FAULT, HANDOVER};
 use super::drivers::Limits;
-use super::injection::{Hand, Injection, Motor, Start};
+use super::injection::{Hand, Injection, Motor, Start, first_of};
 use super::residual::Detectability;
 
 /// A run ends so long after the onset, ms.
@@ -32,6 +34,7 @@ macro_rules! rows {
 }
 
 mod attacks;
+mod bar;
 mod build;
 mod bus;
 mod inputs;
@@ -156,6 +159,8 @@ pub struct FaultCase {
     pub(super) after_ms: u32,
     /// What is less than ideal about the car or the road from the start.
     pub(super) plant: Option<fn(&mut WorldParameters)>,
+    /// What the ECU is told wrong of its bar, from the start of the run on; the fault-free run is that of an ECU that is told right.
+    pub(super) told: Option<fn(&mut Params)>,
 }
 
 impl FaultCase {
@@ -190,7 +195,7 @@ pub struct Group {
 }
 
 /// Every row.
-pub const GROUPS: [Group; 7] = [
+pub const GROUPS: [Group; 8] = [
     Group {
         name: "Inputs",
         rows: inputs::ROWS,
@@ -218,6 +223,10 @@ pub const GROUPS: [Group; 7] = [
     Group {
         name: "Attacks by legal frames",
         rows: attacks::ROWS,
+    },
+    Group {
+        name: "Torsion bar",
+        rows: bar::ROWS,
     },
 ];
 
@@ -266,6 +275,7 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
         lie_m: None,
         after_ms: AFTER_MS,
         plant: None,
+        told: None,
     }
 }
 
@@ -294,6 +304,31 @@ impl FaultCase {
     pub(super) fn is_limited(&self) -> bool {
         let opposes = |one: &Injection| matches!(one, Injection::Hand(Hand::Opposes { .. }));
         self.obeys() && !self.injections.iter().any(opposes)
+    }
+
+    /// What of a column with a bar fails at the onset, if anything does.
+    pub(super) fn column_fault(&self) -> Option<ColumnFault> {
+        first_of!(self.injections, Injection::Column(fault) => *fault)
+    }
+
+    /// Why a world whose column has a bar, or has none, cannot have this row; `None` if it can.
+    pub fn left_out(&self, has_bar: bool) -> Option<&'static str> {
+        if !has_bar {
+            let is_of_a_bar = self.told.is_some() || self.column_fault().is_some();
+            return is_of_a_bar.then_some("its column has no torsion bar");
+        }
+        let mut plant = WorldParameters::default();
+        self.plant?(&mut plant);
+        match plant {
+            WorldParameters { friction_nm, .. } if friction_nm != 0.0 => {
+                Some("its wheel and column have their own friction")
+            }
+            WorldParameters { assist_nm, .. } if assist_nm != 0.0 => Some("its column has its own assist"),
+            WorldParameters { motor_lag_s, .. } if motor_lag_s != 0.0 => {
+                Some("the lag of its motor is that of its assist")
+            }
+            _ => None,
+        }
     }
 
     /// The limits of these drivers for this row.

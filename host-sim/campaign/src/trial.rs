@@ -179,6 +179,11 @@ impl World {
         }
     }
 
+    /// Whether its column has a torsion bar.
+    pub fn has_bar(&self) -> bool {
+        self.kind.is_some_and(WorldKind::has_bar)
+    }
+
     /// What it has beyond the paper's world; nothing in the paper's own.
     pub fn kind(&self) -> Option<&'static WorldKind> {
         self.kind
@@ -244,7 +249,10 @@ impl World {
         let mut guidance = GuidanceParameters::default();
         guidance.controller.law = self.law as f64;
         let scenario = Scenario::builder().course(course).speed(speed.clone()).seed(seed);
-        let scenario = scenario.guidance(guidance);
+        let scenario = match self.kind {
+            None => scenario.guidance(guidance),
+            Some(kind) => kind.on_its_column(scenario, guidance),
+        };
         let (driver, scenario) = match self.driven_by {
             Drivers::Paper => (
                 driver.name.clone(),
@@ -327,13 +335,24 @@ impl World {
             change,
         } = self.draw(row, seed, &mut rng);
         let end_ms = onset_ms + row.after_ms;
-        let mut harness = EcuHarness::new(row, &scenario, onset_ms, end_ms, rng);
+        let told = |wrong: fn(&mut Params)| {
+            let mut guidance = *scenario.guidance();
+            wrong(&mut guidance.controller);
+            let told = scenario.to_builder().guidance(guidance).build();
+            told.expect("half and twice are in range")
+        };
+        let as_told = row.told.map(told);
+        let with_ecu = |of: &Scenario| {
+            let harness = EcuHarness::new(row, of, onset_ms, end_ms, rng.clone());
+            Simulation::with(of, harness)
+        };
+        let right = as_told.as_ref().map(|_| with_ecu(&scenario));
+        let mut simulation = with_ecu(as_told.as_ref().unwrap_or(&scenario));
         if traced {
-            harness.keep_trace();
+            simulation.guidance_mut().keep_trace();
         }
-        let mut simulation = Simulation::with(&scenario, harness);
         let run = catch_unwind(AssertUnwindSafe(|| {
-            drive(&mut simulation, onset_ms, end_ms, !traced)
+            drive(&mut simulation, right, onset_ms, end_ms, !traced)
         }));
         let mut harness = simulation.into_guidance();
         let trace = harness.take_trace();
@@ -352,7 +371,9 @@ impl World {
             });
         }
         let reported = record.ecu.events().collect();
-        let reported_at = record.ecu.first_fault_from(onset_ms);
+        // What is told wrong may be noticed before the onset.
+        let from_ms = if row.told.is_some() { 0 } else { onset_ms };
+        let reported_at = record.ecu.first_fault_from(from_ms);
         let verdict = match self.kind {
             None => judge(row, onset_ms, &record),
             // The second opinion on what can be seen knows the paper's world only: here every rule must hold, and what is
@@ -375,7 +396,7 @@ impl World {
                 .into_iter()
                 .flatten()
                 .min()
-                .map(|at| at - onset_ms),
+                .map(|at| at.saturating_sub(onset_ms)),
             left_after_ms: left_at.map(|at| at - onset_ms),
             deviation,
             peak_nm: record.peak_nm,

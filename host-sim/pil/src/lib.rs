@@ -11,7 +11,7 @@
 //!
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - `adapter`: the way to a board.
 //! - `link`: frames as bytes.
-//! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
+//! - [`comparator`]: compares the answers, on its own thread. - [`cost`]: what authentication costs. - [`stepped`]: a target for a caller that compares by itself,
 //!   and may reach into its memory. - [`mod@bench`]: a bus that keeps the time of the wall. - [`parameters`]: a product's, over
 //!   the same adapters. - [`diagnosis`]: a workshop's tester. - [`live`]: what goes over a bus.
 //!
@@ -32,6 +32,7 @@
 mod adapter;
 pub mod bench;
 pub mod comparator;
+pub mod cost;
 pub mod diagnosis;
 mod gdb;
 pub mod image;

@@ -9,7 +9,8 @@ use haptic_core::bus::Frame;
 use haptic_core::controller::params::Params;
 use haptic_core::quantity::Instant;
 use haptic_lockstep::SimTime;
-use haptic_lockstep::{StackUse, Start, StepCost, parameter_frames};
+use haptic_lockstep::{Authenticated, StackUse, Start, StepCost, parameter_frames};
+use haptic_secoc::fresh::Algorithm;
 use object::{Object, ObjectSymbol};
 
 use super::gdb::Gdb;
@@ -92,6 +93,14 @@ impl Stepped {
             self.send(&frame)?;
         }
         self.send(&start.encode())
+    }
+
+    /// What commands the target needs a proof from now on.
+    ///
+    /// # Errors
+    /// The target is gone.
+    pub fn authenticate(&mut self, algorithm: Algorithm) -> Result<(), PilError> {
+        self.send(&Authenticated(algorithm).encode())
     }
 
     /// Sends a tick: the frames that come, and the time at which the controller takes them and steps.

@@ -5,6 +5,10 @@
 use crate::models::disturbances::SensorErrors;
 use crate::models::nonlinear::{Tyres, WorldParameters};
 use crate::models::tolerances::Tolerances;
+use crate::models::torsion_bar::{
+    AngleSensor, AssistParameters, ColumnKind, ColumnParameters, CurveChoice, Usual,
+};
+use crate::scenario::{GuidanceParameters, ScenarioBuilder};
 
 /// How a road lies across.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,6 +73,8 @@ enum Part {
     Motor,
     /// A boost curve.
     Assist,
+    /// A torsion bar, its assist, and an ECU that is told of it.
+    Bar,
     /// Delay, jitter and noise of a production camera.
     Camera,
     /// A road of mu 0.3, and curves to 3 m/s2.
@@ -110,7 +116,7 @@ pub struct Happens {
 use Part::{Assist, Bank, Blind, Braking, Camera, Friction, Gusts, Motor, Slippery, Steep, Wind};
 
 /// Every world, from paper to beyond.
-pub const WORLDS: [WorldKind; 20] = [
+pub const WORLDS: [WorldKind; 21] = [
     world("calibrated", "a calibrated car, flat road, no friction", &[]),
     world(
         "friction",
@@ -141,6 +147,11 @@ pub const WORLDS: [WorldKind; 20] = [
         "assist",
         "everything, and a power assist of 8 N.m at 3 N.m of driver torque, half of it at 60 km/h",
         &[Assist],
+    ),
+    world(
+        "bar",
+        "a torsion bar with friction of 0.1 and 0.3 N.m, and the medium assist, as in examples/torsion-bar.toml",
+        &[Part::Bar],
     ),
     more(
         "camera",
@@ -292,6 +303,31 @@ impl WorldKind {
             assist_nm: if self.has(Assist) { 8.0 } else { off.assist_nm },
             ..off
         }
+    }
+
+    /// Whether its column has a torsion bar.
+    pub fn has_bar(&self) -> bool {
+        self.has(Part::Bar)
+    }
+
+    /// A scenario with its column and assist, if those are not the paper's, and with guidance whose ECU is told of them.
+    pub fn on_its_column(&self, scenario: ScenarioBuilder, guidance: GuidanceParameters) -> ScenarioBuilder {
+        if !self.has_bar() {
+            return scenario.guidance(guidance);
+        }
+        let column = ColumnParameters {
+            kind: ColumnKind::TorsionBar,
+            upper_friction_nm: 0.1,
+            lower_friction_nm: 0.3,
+            angle: AngleSensor::Column,
+            ..ColumnParameters::default()
+        };
+        let assist = AssistParameters {
+            curve: CurveChoice::Usual(Usual::Medium),
+            ..AssistParameters::default()
+        };
+        let guidance = guidance.told_of(&column);
+        scenario.column(column).assist(assist).guidance(guidance)
     }
 
     /// How far cars differ.

@@ -90,6 +90,26 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
         let count = golden(key);
         has(porting, format!("| {row} | {count} | {} |", share(&count)));
     }
+    for mac in ["SipHash-2-4", "AES-CMAC"] {
+        for flood in ["", ", flood of false proofs"] {
+            let [step, tick] =
+                ["step", "tick"].map(|what| golden(&format!("mps2-an386 worst {what}, {mac}{flood}")));
+            has(
+                porting,
+                format!("| {mac}{flood} | {step} | {tick} | {} |", share(&tick)),
+            );
+        }
+    }
+    let lane = |kind: &str| {
+        ["SipHash-2-4", "AES-CMAC"].map(|mac| golden(&format!("mps2-an386 a {kind} lane preview, {mac}")))
+    };
+    let ([true_1, true_2], [false_1, false_2]) = (lane("true"), lane("false"));
+    has(
+        porting,
+        format!(
+            "A true lane preview takes {true_1} with SipHash-2-4 and {true_2} with AES-CMAC, a false one {false_1} and {false_2}."
+        ),
+    );
     let worst = golden("mps2-an386 worst step, any example");
     let worst: f64 = worst.replace(',', "").parse().unwrap();
     let slower = 2.0 * worst / 120e3 * 100.0;

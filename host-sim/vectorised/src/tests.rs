@@ -305,10 +305,10 @@ fn pair_in(world: &WorldKind, course: &Course, number: u64) -> [Scenario; 2] {
 }
 
 /// Each world that has a name, on a level road and on one that lies aslant. Where the camera is late or blind nobody is guided
-/// side by side.
+/// side by side, and a column with a bar is no world of these scenarios.
 #[test]
 fn every_named_world_is_the_same_side_by_side() {
-    for world in &WORLDS {
+    for world in WORLDS.iter().filter(|world| !world.has_bar()) {
         let roads = [short_course(), banked_course()];
         let numbers = roads
             .iter()

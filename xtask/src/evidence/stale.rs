@@ -36,12 +36,12 @@ impl fmt::Display for State {
             Self::Missing => f.write_str("not measured"),
             Self::Unknown(commit) => write!(f, "measured at {commit}, which is not in this repository"),
             Self::Changed(commit, files) => {
-                write!(
-                    f,
-                    "stale: since {commit} {} files changed: {}",
-                    files.len(),
-                    files.join(", ")
-                )
+                let (named, more) = files.split_at(files.len().min(3));
+                write!(f, "stale: changed since {commit}: {}", named.join(", "))?;
+                match more.len() {
+                    0 => Ok(()),
+                    more => write!(f, " and {more} more"),
+                }
             }
             Self::Differs(what) => write!(f, "stale: the list has another {what} now"),
             Self::Fresh { commit, less: None } => write!(f, "measured at {commit}"),

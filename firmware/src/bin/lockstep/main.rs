@@ -41,7 +41,9 @@ mod target {
     use haptic_firmware::stack;
     use haptic_firmware::storage::Found;
     use haptic_lockstep::SimTime;
-    use haptic_lockstep::{StackUse, Start, StartState, StepCost, set_parameter};
+    use haptic_lockstep::{Authenticated, StackUse, Start, StartState, StepCost, set_parameter};
+    use haptic_secoc::Keys;
+    use haptic_secoc::verifier::{Credentials, Verifier};
     use heapless::Vec;
 
     /// Most frames of one tick; a full bus at 500 kbit/s carries 4 a millisecond.
@@ -100,6 +102,8 @@ mod target {
         steps: u32,
         rejected: u32,
         product: Option<Product>,
+        /// None where no frame needs a proof.
+        verifier: Option<Verifier>,
         /// Codes of faults, which a product's restart leaves alone.
         cells: Cells,
     }
@@ -176,6 +180,7 @@ mod target {
             steps: 0,
             rejected: 0,
             product: None,
+            verifier: None,
             cells: EMPTY,
         };
 
@@ -186,6 +191,8 @@ mod target {
                 begin(ecu, start, &self.params);
                 self.frames.clear();
                 self.be_product(start.state == StartState::Product);
+            } else if let Some(authenticated) = Authenticated::decode(&frame) {
+                self.authenticate(authenticated);
             } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
                 panic!("more than {FRAMES_PER_TICK} frames in one tick");
             }
@@ -199,6 +206,37 @@ mod target {
                 let found = Found::default();
                 self.product = Some(Product::new(found, &self.params, Boot::default(), &self.cells));
             }
+        }
+
+        /// Apart for the same reason.
+        #[inline(never)]
+        fn authenticate(&mut self, Authenticated(algorithm): Authenticated) {
+            let credentials = Credentials::Keys(Keys::bench(algorithm), Some(0));
+            self.verifier = Some(Verifier::new(credentials));
+        }
+
+        /// Hands the frames of a tick to the ECU, as far as they need no proof.
+        fn hear(&mut self, ecu: &mut Ecu, now: Instant) {
+            for frame in &self.frames {
+                let passed = match &mut self.verifier {
+                    Some(verifier) => verifier.receive(frame, now),
+                    None => Some((*frame, now)),
+                };
+                if passed.is_some_and(|(frame, at)| ecu.receive(&frame, at).is_err()) {
+                    self.rejected = self.rejected.wrapping_add(1);
+                }
+            }
+        }
+
+        /// Hands on what is proven, and says what is to be said of it.
+        fn verify(&mut self, ecu: &mut Ecu) -> Option<Frame> {
+            let verifier = self.verifier.as_mut()?;
+            while let Some((frame, at)) = verifier.verified() {
+                if ecu.receive(&frame, at).is_err() {
+                    self.rejected = self.rejected.wrapping_add(1);
+                }
+            }
+            verifier.step(self.steps)
         }
 
         fn tick(&mut self, now: Instant, place: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
@@ -217,20 +255,17 @@ mod target {
                 self.frames.clear();
             }
             let start = ThisBoard::cycles();
-            for frame in &self.frames {
-                if ecu.receive(frame, now).is_err() {
-                    self.rejected = self.rejected.wrapping_add(1);
-                }
-            }
+            self.hear(ecu, now);
             let step = ecu.step(now);
             let stepped = ThisBoard::cycles();
             let background = ecu.background_step();
+            let authentication = self.verify(ecu);
             let background_cycles = ThisBoard::cycles().wrapping_sub(stepped);
             let cycles = stepped.wrapping_sub(start);
             self.frames.clear();
             self.steps = self.steps.wrapping_add(1);
             send(can, &step.guidance);
-            for frame in step.others.iter().chain(&background) {
+            for frame in step.others.iter().chain(&background).chain(&authentication) {
                 send(can, frame);
             }
             if let Some(product) = &mut self.product {

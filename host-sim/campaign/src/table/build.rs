@@ -4,6 +4,7 @@ use super::{CONTRADICTION_MS, Class, Expect, FaultCase, LONG_AFTER_MS, Place, Pl
 use crate::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LOCKED};
 use crate::injection::Start;
 use crate::residual::Detectability;
+use haptic_core::controller::params::Params;
 use haptic_sim::models::nonlinear::WorldParameters;
 
 const fn reaches(mode: u64) -> Expect {
@@ -60,6 +61,8 @@ words! {
     from(state: Start) { start: state };
     place(place: PlaceOnRoad) { place_on_road: Some(place) };
     on(plant: fn(&mut WorldParameters)) { plant: Some(plant) };
+    /// From the start of the run on.
+    told(wrong: fn(&mut Params)) { told: Some(wrong) };
     /// Also run in QEMU.
     q() { place: Place::Both };
     /// Run in QEMU only.

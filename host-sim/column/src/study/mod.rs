@@ -20,7 +20,7 @@ use haptic_sim::fields::InFile;
 use haptic_sim::models::torsion_bar::{
     AssistParameters, BarPlant, ColumnKind, ColumnParameters, CurveChoice, Usual,
 };
-use haptic_sim::scenario::{ScenarioBuilder, ScenarioError};
+use haptic_sim::scenario::{GuidanceParameters, ScenarioBuilder, ScenarioError};
 use serde::Deserialize;
 
 /// A column of one's own, as a file (TOML) has it: the two tables of a scenario. It has a bar whatever its kind says.
@@ -96,16 +96,13 @@ impl ColumnFile {
 
 /// What an ECU is told of a file's column, whose angle comes every so many seconds.
 fn believed(file: &ColumnFile, column_period_s: f64, observer_bandwidth_rad_per_s: f64) -> Params {
-    let column = &file.column;
+    let told = GuidanceParameters::default().told_of(&file.column);
     Params {
+        // The studies give the ECU the angle of the column.
         torque_sensor: BAR_AND_COLUMN_ANGLE,
-        wheel_inertia_kg_m2: column.j_w_kg_m2,
-        wheel_damping_nm_s: column.b_w_nms_per_rad,
-        wheel_friction_nm: column.upper_friction_nm,
-        bar_stiffness_nm_per_rad: column.k_tb_nm_per_rad,
         column_period_s,
         observer_bandwidth_rad_per_s,
-        ..Params::PAPER
+        ..told.controller
     }
 }
 

@@ -3,7 +3,7 @@
 use haptic_core::safety::modes::Mode;
 use haptic_sim::Scenario;
 use haptic_sim::population::LaneKeeper;
-use haptic_sim::scenario::Speed;
+use haptic_sim::scenario::{GuidanceParameters, Speed};
 use haptic_sim::seeds::Stream;
 use haptic_sim::simulation::{Ending, Run};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -123,8 +123,10 @@ impl SegmentNumber {
         } else {
             Speed::constant_kmh(speed_kmh)
         };
+        let scenario = Scenario::builder().course(course).speed(speed);
+        let scenario = world.on_its_column(scenario, GuidanceParameters::default());
         let scenario = driver
-            .drives(Scenario::builder().course(course).speed(speed), speed_kmh / 3.6)
+            .drives(scenario, speed_kmh / 3.6)
             .world(world.parameters())
             .tolerances(world.tolerances(car))
             .sensor_errors(world.sensor_errors())

@@ -55,12 +55,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         print(&document::table_of_faults())?;
         return Ok(Outcome::Good);
     }
-    let rows = choose(&arguments.rows, arguments.target)?;
     let seeds = match arguments.seed {
         Some(seed) => seed..seed + 1,
         None => arguments.first_seed..arguments.first_seed + arguments.seeds,
     };
-    let output = arguments.results.begin("faults")?.named("faults.json");
     let world = match &arguments.world {
         None => None,
         Some(name) => {
@@ -76,6 +74,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let law = LAWS.iter().position(|law| *law == arguments.law);
     let world = world.guided_by(law.unwrap_or_default());
+    let rows = choose(&arguments.rows, arguments.target, world.has_bar())?;
+    let output = arguments.results.begin("faults")?.named("faults.json");
     let runs = rows.len() as u64 * (seeds.end - seeds.start);
     let campaign = progress::over(runs, "runs", |done| {
         if arguments.target {
@@ -95,14 +95,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     output.show(&report(&campaign, told.collect()), &campaign, holds)
 }
 
-fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, BadInput> {
+fn choose(names: &[String], in_qemu: bool, has_bar: bool) -> Result<Vec<&'static FaultCase>, BadInput> {
     let runs = |row: &&'static FaultCase| match row.place {
         Place::Host => !in_qemu,
         Place::Both => true,
         Place::Target => false,
     };
     if names.is_empty() {
-        return Ok(table::rows().filter(runs).collect());
+        let there = |row: &&'static FaultCase| row.left_out(has_bar).is_none();
+        return Ok(table::rows().filter(runs).filter(there).collect());
     }
     let found = |name: &String| {
         let refused = |why: &str| Err(BadInput(format!("--rows: {why}")));
@@ -115,7 +116,10 @@ fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, Ba
                 "{name} breaks the image and not the controller: cargo test -p haptic-guidance resets::"
             )),
             Some(row) if !runs(&row) => refused(&format!("{name} is not among those that run with --target")),
-            Some(row) => Ok(row),
+            Some(row) => match row.left_out(has_bar) {
+                Some(why) => refused(&format!("{name} is left out of this world: {why}")),
+                None => Ok(row),
+            },
         }
     };
     names.iter().map(found).collect()

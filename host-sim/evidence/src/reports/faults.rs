@@ -2,7 +2,7 @@
 
 use haptic_campaign::campaign::{Campaign, CaseResult};
 use haptic_campaign::drivers::{Drivers, Limits};
-use haptic_campaign::table::{Class, FaultCase};
+use haptic_campaign::table::{self, Class, FaultCase};
 use haptic_campaign::{OFF_ROAD_M, TrialOutcome};
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_report::plot::{Axis, Figure, Mark, Panel, Series};
@@ -20,9 +20,10 @@ pub(crate) fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
     );
     let mut blocks = vec![
         Block::figure("faults", figure(campaign), caption),
-        Block::Table(table(campaign)),
+        Block::Table(fault_by_fault(campaign)),
         Block::Text(limits(campaign)),
     ];
+    blocks.extend(campaign.has_bar.then(|| Block::Text(behind_a_bar())));
     blocks.extend(campaign.too_often().map(|row| Block::Text(left_too_often(row))));
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
     let how_often = vec![Block::Table(shares(campaign)), Block::Text(SHARES.into())];
@@ -74,6 +75,17 @@ fn summary(campaign: &Campaign) -> String {
         campaign.runs,
         campaign.cycles,
         campaign.failures().count()
+    )
+}
+
+/// What of the table and of its limits a column with a bar does not have.
+fn behind_a_bar() -> String {
+    let left_out = table::rows().filter_map(|row| Some((row.name, row.left_out(true)?)));
+    let named: Vec<String> = left_out.map(|(name, why)| format!("{name} ({why})")).collect();
+    format!(
+        "Left out: {}. The limits of distance, share and torque were chosen on the paper's column, and are not meant for a bar. A row of \
+         an ECU that is told wrong is compared with one that is told right.",
+        named.join(", ")
     )
 }
 
@@ -173,7 +185,7 @@ fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
 }
 
 /// Fault by fault.
-fn table(campaign: &Campaign) -> Table {
+fn fault_by_fault(campaign: &Campaign) -> Table {
     let row = |row: &CaseResult| {
         let verdict = match row.failures.len() {
             0 if row.leaves_too_often => "FAIL".into(),

@@ -13,7 +13,8 @@ use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::trace::Sample;
 use haptic_log::{Event, candump};
 use haptic_metrics::{DEFINITIONS, Definition};
-use haptic_sim::scenario::FailureKind;
+use haptic_sim::models::torsion_bar::CurveChoice;
+use haptic_sim::scenario::{FailureKind, Scenario};
 use haptic_sim::simulation::Ending;
 
 /// Writes the time series if they are asked for, and the bus if it was recorded (as `candump -L` does).
@@ -137,7 +138,7 @@ pub fn report(single: &SingleRun) -> Report {
         "Lateral error, wheel angle and torques."
     };
     let summary = format!(
-        "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}), failure {}: {}. Metrics are taken over {from} to {to} m of \
+        "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}), failure {}: {}. {}Metrics are taken over {from} to {to} m of \
              {:.0} m.",
         results.course,
         scenario.speed(),
@@ -147,6 +148,7 @@ pub fn report(single: &SingleRun) -> Report {
         scenario.condition(),
         results.record.failure,
         how_it_ended(single),
+        column(scenario),
         results.course_length_m,
     );
     let along = vec![
@@ -169,6 +171,22 @@ pub fn report(single: &SingleRun) -> Report {
     }
 }
 
+/// The column, where it is not the paper's.
+fn column(scenario: &Scenario) -> String {
+    let column = scenario.column();
+    if !column.has_bar() {
+        return String::new();
+    }
+    let assist = match &scenario.assist().curve {
+        CurveChoice::Usual(usual) => usual.name(),
+        CurveChoice::Points(_) => "the file's own",
+    };
+    format!(
+        "A torsion bar of {} N.m/rad, assist: {assist}. ",
+        column.k_tb_nm_per_rad
+    )
+}
+
 fn events(single: &SingleRun) -> Vec<Event> {
     let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
     let mut events = single.reported.clone();
@@ -189,6 +207,14 @@ fn events(single: &SingleRun) -> Vec<Event> {
         if noticed_s <= end_s {
             events.push(event(noticed_s, "The driver steers as manually".into()));
         }
+    }
+    let fault_s = single.scenario.column().fault_at_s().filter(|t| *t <= end_s);
+    if let Some(time_s) = fault_s {
+        let fault = serde_json::json!(single.scenario.column().fault);
+        events.push(event(
+            time_s,
+            format!("The column fails: {}", fault.as_str().unwrap_or_default()),
+        ));
     }
     let what = match single.run.ending {
         Ending::CourseEnd => "The far point reaches the end of the course".into(),
@@ -227,7 +253,27 @@ mod tests {
     use super::*;
     use crate::plot::Mark;
     use haptic_sim::models::driver::DriverParameters;
+    use haptic_sim::models::torsion_bar::{ColumnFault, ColumnKind, ColumnParameters};
     use haptic_sim::scenario::{Condition, Scenario};
+
+    #[test]
+    fn a_column_with_a_bar_and_what_fails_in_it_are_named() {
+        let column = ColumnParameters {
+            kind: ColumnKind::TorsionBar,
+            fault: ColumnFault::AssistLost,
+            fault_time_s: 70.0,
+            ..ColumnParameters::default()
+        };
+        let scenario = Scenario::builder().column(column).build().unwrap();
+        let single = haptic_batch::run::run(scenario, false).unwrap();
+        let summary = report(&single).summary;
+        assert!(
+            summary.contains("A torsion bar of 143.24 N.m/rad, assist: none."),
+            "{summary}"
+        );
+        let failed = |event: &Event| event.time_s == 70.0 && event.what == "The column fails: assist-lost";
+        assert!(events(&single).iter().any(failed));
+    }
 
     fn ends(speed_kmh: f64) -> (SingleRun, Vec<Vec<(f64, f64)>>) {
         let driver = DriverParameters {

@@ -8,7 +8,7 @@ use crate::models::nonlinear::NonlinearPlant;
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::step_of;
 use crate::models::tolerances::Car;
-use crate::models::torsion_bar::BarPlant;
+use crate::models::torsion_bar::{BarPlant, ColumnFault};
 use crate::scenario::Scenario;
 use crate::seeds::Stream;
 
@@ -109,6 +109,13 @@ impl PaperPair {
     /// Whether the driver drives as manually from now on, as one does who has understood that there is no guidance.
     pub fn take_over(&mut self, takes_over: bool) {
         self.takes_over = takes_over;
+    }
+
+    /// Something of a column with a bar fails in the next step; nothing does where there is no bar.
+    pub fn fail(&mut self, fault: ColumnFault) {
+        if let Mover::Bar(bar) = &mut self.mover {
+            bar.0.fail(fault);
+        }
     }
 
     /// Torque of the driver's arm at the start of the next step, without remnant and hand, N.m.

@@ -1,6 +1,6 @@
 //! The values that a person chooses, and what the controller knows of them.
 
-use haptic_core::controller::params::{Params, VehicleParams};
+use haptic_core::controller::params::{BAR_AND_COLUMN_ANGLE, BAR_AND_WHEEL_ANGLE, Params, VehicleParams};
 
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Sensors, Speed};
 use crate::models::disturbances::SensorErrors;
@@ -8,7 +8,7 @@ use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
 use crate::models::road::Course;
 use crate::models::tolerances::Tolerances;
-use crate::models::torsion_bar::{AssistParameters, ColumnParameters};
+use crate::models::torsion_bar::{AngleSensor, AssistParameters, ColumnParameters};
 use crate::models::vehicle::VehicleParameters;
 
 /// The controller and the camera that feeds it.
@@ -32,6 +32,23 @@ impl Default for GuidanceParameters {
             t_f: 0.7,
             probe: false,
         }
+    }
+}
+
+impl GuidanceParameters {
+    /// This guidance, whose controller is told of a bar: what its sensor is, and what wheel and bar are.
+    #[must_use]
+    pub fn told_of(mut self, column: &ColumnParameters) -> Self {
+        let params = &mut self.controller;
+        params.torque_sensor = match column.angle {
+            AngleSensor::Wheel => BAR_AND_WHEEL_ANGLE,
+            AngleSensor::Column => BAR_AND_COLUMN_ANGLE,
+        };
+        params.wheel_inertia_kg_m2 = column.j_w_kg_m2;
+        params.wheel_damping_nm_s = column.b_w_nms_per_rad;
+        params.wheel_friction_nm = column.upper_friction_nm;
+        params.bar_stiffness_nm_per_rad = column.k_tb_nm_per_rad;
+        self
     }
 }
 

@@ -1,6 +1,7 @@
 //! `host-sim ecu COMMAND`: the ECU itself, in QEMU or on a board, and its bus.
 
 mod bus;
+mod cost;
 mod diag;
 mod live;
 mod parameters;
@@ -23,6 +24,8 @@ pub(super) enum Command {
     Parameters(parameters::Arguments),
     /// What a workshop's tester asks of an ECU: stored faults, readings, parameters (UDS)
     Diag(diag::Arguments),
+    /// Instructions of a scenario's steps in QEMU without authentication, with each MAC, and under a flood
+    Cost(cost::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
 }
@@ -34,6 +37,7 @@ pub(super) fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Live(arguments) => live::run(arguments),
         Command::Parameters(arguments) => parameters::run(arguments),
         Command::Diag(arguments) => diag::run(arguments),
+        Command::Cost(arguments) => cost::run(arguments),
         Command::Bus(arguments) => bus::run(arguments),
     }
 }

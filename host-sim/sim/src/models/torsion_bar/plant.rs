@@ -184,6 +184,11 @@ impl BarPlant {
         reads_nm.clamp(-most, most)
     }
 
+    /// Something of the column fails in the next step.
+    pub fn fail(&mut self, fault: ColumnFault) {
+        (self.column.fault, self.fails_in) = (fault, Some(0));
+    }
+
     /// Lets time pass for what fails.
     fn age(&mut self) {
         match self.fails_in {

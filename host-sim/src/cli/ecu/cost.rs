@@ -1,0 +1,61 @@
+//! `host-sim ecu cost [SCENARIO.toml]`: what authentication costs the ECU.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use haptic_pil::PilError;
+use haptic_sim::input::InputError;
+use haptic_sim::scenario::Scenario;
+
+use super::super::{BadInput, Outcome, print, print_json};
+use crate::processor::{self, ProcessorError};
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Arguments {
+    /// Scenario file (TOML, see docs/files.md); default: medium reliance on paper-course
+    #[arg(value_name = "SCENARIO.toml")]
+    scenario: Option<PathBuf>,
+    /// Print the results as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let scenario = match &arguments.scenario {
+        Some(path) => haptic_batch::files::load_scenario(path)?,
+        None => Scenario::default(),
+    };
+    let drive = match processor::record(&scenario) {
+        Ok(drive) => drive,
+        Err(ProcessorError::Scenario(message)) => return Err(InputError::new("cost", message).into()),
+        Err(_) => unreachable!("nothing is started yet"),
+    };
+    let costs = match haptic_pil::cost::measure(&drive) {
+        Ok(costs) => costs,
+        Err(error @ PilError::Missing(_)) => return Err(error.into()),
+        Err(error) => {
+            eprintln!("error: {error}");
+            return Ok(Outcome::Failed);
+        }
+    };
+    if arguments.json {
+        print_json(&costs)?;
+        return Ok(Outcome::Good);
+    }
+    print(
+        "instructions in QEMU (Cortex-M4F)        step: mean   worst  behind it, worst  tick, worst  stack, B",
+    )?;
+    for cost in &costs.drives {
+        print(&format!(
+            "{:<40} {:>11.0} {:>7} {:>17} {:>12} {:>9}",
+            cost.what, cost.mean, cost.worst, cost.worst_behind, cost.worst_tick, cost.stack_bytes
+        ))?;
+    }
+    for (name, one) in [("SipHash-2-4", costs.siphash), ("AES-CMAC", costs.aes)] {
+        print(&format!(
+            "a lane preview with {name}: {} if it is true, {} if it is false (two MACs)",
+            one.taken, one.refused
+        ))?;
+    }
+    Ok(Outcome::Good)
+}
