@@ -78,8 +78,31 @@ fn the_history_counts_to_255_and_no_further() {
     for k in 1..=300_u32 {
         history.step(Instant::from_us(2000 * k), lane);
         history.step(Instant::from_us(2000 * k + 1000), FaultSet::NONE);
-        let counts: Vec<u8> = history.records().map(|record| record.count).collect();
-        assert_eq!(counts, [k.min(255) as u8]);
+        let counts = [0, 1].map(|index| history.record(index).map(|record| record.count));
+        assert_eq!(counts, [Some(k.min(255) as u8), None]);
+    }
+}
+
+/// Lines are those of the faults that appeared, in the order of their bits, of the first bit and the last.
+#[test]
+fn the_history_has_a_line_for_each_fault_that_appeared() {
+    let last = Fault::ALL[Fault::COUNT - 1];
+    for appeared in [
+        &[][..],
+        &[Fault::LaneTimeout],
+        &[last],
+        &[Fault::LaneTimeout, Fault::Memory, Fault::HandsOff, last],
+        &Fault::ALL,
+    ] {
+        let mut history = FaultHistory::new(Instant::from_us(0));
+        let faults = appeared
+            .iter()
+            .fold(FaultSet::NONE, |set, fault| set.with(*fault));
+        history.step(Instant::from_us(1000), faults);
+        let lines = (0..40).map_while(|index| history.record(index));
+        let lines: Vec<Fault> = lines.map(|record| record.fault).collect();
+        assert_eq!(lines, appeared);
+        assert_eq!(history.record(u32::MAX), None);
     }
 }
 
@@ -92,7 +115,7 @@ fn the_history_knows_when_a_fault_last_appeared() {
     for second in 0..70_000_u32 {
         let present = if second < 3 { lane } else { FaultSet::NONE };
         history.step(now, present);
-        let record = history.records().next().unwrap();
+        let record = history.record(0).unwrap();
         assert_eq!(
             (record.age_s, record.present),
             (second.min(65_535) as u16, second < 3)
@@ -100,6 +123,6 @@ fn the_history_knows_when_a_fault_last_appeared() {
         now = now.after(Micros::from_ms(1000));
     }
     history.step(now, lane);
-    let record = history.records().next().unwrap();
+    let record = history.record(0).unwrap();
     assert_eq!((record.age_s, record.count), (0, 2));
 }

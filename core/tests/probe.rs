@@ -387,11 +387,11 @@ fn the_estimator_is_told_what_was_applied_until_the_sample() {
     rig.probe = true;
     let estimator = Setup::PAPER.estimator;
     let mut state = estimator.start();
-    let mut has_begun = false;
+    let (mut has_begun, mut driver) = (false, 0.0);
     for _ in 0..12_000 {
         let applied = rig.applied;
-        // A driver who yields at once, whom the arm's lag that is assumed puts 1.57 rad apart.
-        let driver = -0.5 * (applied - 0.4);
+        // An arm with the lag that is assumed: of one that yields at once the estimator takes a later sample for another lag.
+        driver += (-0.5 * (applied - 0.4) - driver) / 100.0;
         rig.driver = Some(driver);
         let is_new = rig.ticks.is_multiple_of(2);
         let step = rig.tick();

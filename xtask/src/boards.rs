@@ -240,11 +240,13 @@ fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
     ])
 }
 
-/// Drives in which something happens: guidance that fails or is handed over, brakes, every field of a scenario. Their steps take more.
-const EVENTFUL: [&str; 3] = [
+/// Drives in which something happens: guidance that fails or is handed over, brakes, every field of a scenario, a torsion bar. Their
+/// steps take more.
+const EVENTFUL: [&str; 4] = [
     "examples/relying-driver.toml",
     "examples/every-field.toml",
     "examples/braking-into-a-curve.toml",
+    "examples/torsion-bar.toml",
 ];
 
 /// What whole runs take in QEMU, every frame of them compared: the stack that the lockstep image

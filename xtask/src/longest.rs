@@ -25,8 +25,6 @@ use crate::tool;
 #[derive(Debug, Clone, Copy)]
 enum Most {
     Rounds(u64),
-    /// Once for each value of an array of this type, whose length stands behind it in the names of the functions.
-    Each(&'static str),
     /// Once for each place of a ring of so many; a round may read several places, as the compiler has unrolled it.
     Places(u64),
 }
@@ -43,8 +41,11 @@ const LOOPS: &[(&str, Most, &str)] = &[
         Most::Rounds(6),
         "each halves a ring of 32 places, until nothing is left",
     ),
-    ("records", Most::Each("faults::Fault, "), "each fault"),
-    ("unseen", Most::Each("faults::Fault, "), "each fault"),
+    (
+        "record",
+        Most::Rounds(32),
+        "each takes a bit of the fault word away",
+    ),
     (
         "before",
         Most::Places(64),
@@ -286,17 +287,6 @@ impl<'a> Paths<'a> {
         };
         let rounds = match most {
             Most::Rounds(rounds) => *rounds,
-            Most::Each(of) => {
-                let names = members.iter().flat_map(|at| (self.inlined)(at.address));
-                let length = |name: String| {
-                    let (_, behind) = name.split_once(of)?;
-                    behind.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
-                };
-                names
-                    .filter_map(length)
-                    .max()
-                    .with_context(|| format!("{function}: no array of {of}"))?
-            }
             Most::Places(places) => {
                 let read = members
                     .iter()
@@ -544,7 +534,7 @@ mod tests {
         Paths::read(text, 0x100, &bytes, &|address| {
             let is_loop = (0x13a..=0x13e).contains(&address);
             is_loop
-                .then(|| "faults::records<array::IntoIter<faults::Fault, 21>>".to_owned())
+                .then(|| "faults::FaultHistory::record".to_owned())
                 .into_iter()
                 .collect()
         })
@@ -556,8 +546,8 @@ mod tests {
         let found = paths(TEXT).unwrap();
         // cmp, beq, three, bl, two of the call, pop.
         assert_eq!(found.receive, 2 + 3 + 1 + 2 + 1);
-        // tbb, nop, and a round of three for each fault.
-        assert_eq!(found.step, 2 + 21 * 3);
+        // tbb, nop, and a round of three for each bit of the fault word.
+        assert_eq!(found.step, 2 + 32 * 3);
         assert_eq!(found.tick(), found.step + 5 * found.receive);
     }
 

@@ -332,7 +332,7 @@ impl Ecu {
         if due(TURN / 2) {
             let (turn, total) = (steps / TURN, self.history.kinds());
             let index = turn.checked_rem(total);
-            let record = index.and_then(|index| self.history.records().nth(index as usize));
+            let record = index.and_then(|index| self.history.record(index));
             if let Some((index, record)) = index.zip(record) {
                 let line = FaultRecord {
                     index: index as u8,

@@ -480,7 +480,10 @@ impl Receivers {
     /// Whether no receiver is damaged.
     #[inline(always)]
     pub(super) fn are_intact(&self) -> bool {
-        self.lane.agrees() && self.column.agrees() && self.motion.agrees() && self.request.agrees()
+        self.lane.agrees_apart()
+            && self.column.agrees_apart()
+            && self.motion.agrees_apart()
+            && self.request.agrees_apart()
     }
 
     /// Fills in the inputs of a step, from receivers that are intact into [`Inputs::lost`].

@@ -51,14 +51,6 @@ macro_rules! faults {
                 }
             }
 
-            /// How long it may have acted before it is declared, beside the age of its input.
-            #[must_use]
-            pub const fn unseen(self) -> Micros {
-                match self {
-                    $(Self::$name => Micros::from_ms($unseen_ms),)*
-                }
-            }
-
             /// The fault of a code on the bus.
             #[must_use]
             pub const fn from_code(code: i64) -> Option<Self> {
@@ -66,6 +58,18 @@ macro_rules! faults {
                     $($code => Some(Self::$name),)*
                     _ => None,
                 }
+            }
+        }
+
+        impl FaultSet {
+            /// The longest time that any of them may have acted before it was declared, beside the ages of the inputs.
+            #[must_use]
+            pub fn unseen(self) -> Micros {
+                let mut longest = Micros::from_us(0);
+                $(if self.contains(Fault::$name) {
+                    longest = longest.max(Micros::from_ms($unseen_ms));
+                })*
+                longest
             }
         }
     };
@@ -187,13 +191,6 @@ impl FaultSet {
     #[must_use]
     pub const fn intersects(self, other: Self) -> bool {
         self.0 & other.0 != 0
-    }
-
-    /// The longest time that any of them may have acted before it was declared, beside the ages of the inputs.
-    #[must_use]
-    pub fn unseen(self) -> Micros {
-        let present = Fault::ALL.into_iter().filter(|fault| self.contains(*fault));
-        present.map(Fault::unseen).max().unwrap_or_default()
     }
 
     /// The set with one fault more.
@@ -318,18 +315,20 @@ impl FaultHistory {
         self.ever.bits().count_ones()
     }
 
-    /// Every fault that ever appeared, in the order of the bits.
-    #[expect(clippy::as_conversions, reason = "at most 65,535")]
-    pub fn records(&self) -> impl Iterator<Item = Record> {
-        let lines = self.counts.iter().zip(&self.seen_s);
-        let records = Fault::ALL.into_iter().zip(lines);
-        records
-            .filter(|(fault, _)| self.ever.contains(*fault))
-            .map(|(fault, (count, seen_s))| Record {
-                fault,
-                count: *count,
-                age_s: self.seconds.saturating_sub(*seen_s).min(u32::from(u16::MAX)) as u16,
-                present: self.present.contains(fault),
-            })
+    /// A line: of the faults that ever appeared, in the order of the bits, the one of this index.
+    #[must_use]
+    #[expect(clippy::as_conversions, reason = "at most 32 bits; an age of at most 65,535")]
+    pub fn record(&self, index: u32) -> Option<Record> {
+        // Each round takes the lowest bit away.
+        let above = (0..index.min(u32::BITS)).fold(self.ever.bits(), |left, _| left & left.wrapping_sub(1));
+        let place = above.trailing_zeros() as usize;
+        let fault = *Fault::ALL.get(place)?;
+        let (count, seen_s) = (*self.counts.get(place)?, *self.seen_s.get(place)?);
+        Some(Record {
+            fault,
+            count,
+            age_s: self.seconds.saturating_sub(seen_s).min(u32::from(u16::MAX)) as u16,
+            present: self.present.contains(fault),
+        })
     }
 }

@@ -7,6 +7,7 @@ use core::hint::black_box;
 use core::ops::Not;
 
 use fixed::FixedI32;
+use fixed::types::I8F56;
 
 /// A value made of 32-bit words, each of which may hold any bits.
 pub trait Words: Copy + PartialEq {
@@ -56,6 +57,26 @@ where
     fn agreement(&self, other: &Self) -> u32 {
         self.to_bits().agreement(&other.to_bits())
     }
+}
+
+impl Words for I8F56 {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        let [low, high] = halves(self);
+        let (low, high) = (change(low), change(high));
+        Self::from_bits((u64::from(high) << 32 | u64::from(low)).cast_signed())
+    }
+
+    fn agreement(&self, other: &Self) -> u32 {
+        let ([low, high], [other_low, other_high]) = (halves(*self), halves(*other));
+        (low ^ other_low) & (high ^ other_high)
+    }
+}
+
+/// Its two words.
+#[expect(clippy::as_conversions, reason = "each half of the bits")]
+const fn halves(value: I8F56) -> [u32; 2] {
+    let bits = value.to_bits();
+    [bits as u32, (bits >> 32) as u32]
 }
 
 impl<T: Words, const N: usize> Words for [T; N] {

@@ -1,9 +1,12 @@
 //! The ECU with a bar: K_hg read through it beside the truth, and the two ends of the bar at which an angle may be measured. The wheel on its
 //! bar is stepped here in f64.
 
+use std::f64::consts::TAU;
+
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
 use haptic_core::ecu::Boot;
+use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
 
 use crate::rig::Rig;
@@ -117,4 +120,79 @@ fn a_free_wheel_has_no_k_hg() {
     assert!(most < 0.05, "{most}");
     // Its bar moves, so that it is taken for hands where the parameters say so.
     assert!(with_probe(&Params::PAPER, None).1.is_some());
+}
+
+/// What the observer says of a wheel that nobody holds varies by 0.1 N.m at most. Here bar and hands are the same but for lags too short to
+/// count.
+#[test]
+fn a_torque_behind_a_bar_that_varies_by_less_than_0_1_nm_is_no_hand() {
+    for (varies_nm, is_read) in [(0.095, false), (0.105, true)] {
+        let believed = Params {
+            torque_sensor: 2.0,
+            wheel_damping_nm_s: 0.0,
+            observer_bandwidth_rad_per_s: 400.0,
+            ..BAR
+        };
+        let mut rig = Rig::new(Some(&Setup::new(&believed).unwrap()), Boot::default());
+        rig.curve(0.6);
+        rig.run(600);
+        rig.engage = true;
+        rig.run(3000);
+        rig.probe = true;
+        let before = 0.6 - rig.applied + 0.002 * rig.wheel;
+        for ms in 0..14_000_u32 {
+            let turns = 2.5e-3 * f64::from(ms);
+            rig.driver = Some(before + 0.5 * varies_nm * (TAU * turns).sin());
+            rig.tick();
+        }
+        assert_eq!(rig.telemetry.unwrap().k_hg.is_some(), is_read, "{varies_nm}");
+    }
+}
+
+/// What the observer knew of the wheel ends with the column: the next frame is its first sample, where a wheel at rest passes on what its
+/// bar says.
+#[test]
+fn the_observer_begins_anew_after_a_lost_column() {
+    for side in [1.0, -1.0] {
+        let mut rig = Rig::new(Some(&Setup::new(&BAR).unwrap()), Boot::default());
+        rig.driver = Some(side * 3.0);
+        let told = rig.run(1000).command.hands.unwrap().nm();
+        assert!((told - side * 3.0).abs() < 0.01, "{told}");
+        rig.silent[1] = true;
+        assert_eq!(rig.run(200).command.hands, None);
+        rig.silent[1] = false;
+        rig.driver = Some(side * 0.5);
+        let (_, step) = rig.run_until(100, |step| step.command.hands.is_some());
+        assert_eq!(step.command.hands.unwrap().nm(), side * 0.5);
+    }
+}
+
+/// A wheel on a soft bar that hands turn by 0.16 rad within a tenth of a second, with less torque than the column's friction: the column
+/// stands still, and its large damping has nothing to say.
+#[test]
+fn the_check_of_the_column_goes_by_the_end_that_the_tyres_hold() {
+    for side in [1.0, -1.0] {
+        let mut of = Params {
+            torque_sensor: 2.0,
+            bar_stiffness_nm_per_rad: 5.0,
+            ..BAR
+        };
+        of.vehicle.column_damping_nm_s = 9.0;
+        let mut rig = Rig::new(Some(&Setup::new(&of).unwrap()), Boot::default());
+        rig.run(600);
+        let column_moves = |rig: &mut Rig, column_rad: f64| {
+            let mut is_implausible = false;
+            for ms in 0..400_i32 {
+                let share = f64::from((ms - 100).clamp(-50, 50)) / 50.0;
+                let torque = side * 0.4 * share;
+                rig.driver = Some(torque);
+                rig.wheel = side * column_rad * share + torque / 5.0;
+                is_implausible |= rig.tick().command.faults.contains(Fault::ColumnImplausible);
+            }
+            is_implausible
+        };
+        assert!(!column_moves(&mut rig.clone(), 0.0), "{side}");
+        // Where the column goes with it, nobody pays for its damping.
+        assert!(column_moves(&mut rig, 0.16), "{side}");
+    }
 }

@@ -3,11 +3,15 @@
 use haptic_core::controller::config::{Config, hands_lag_s};
 use haptic_core::controller::params::Params;
 use haptic_core::observer::{Sensor, State};
-use haptic_core::quantity::{Radians, Torque};
+use haptic_core::quantity::{Micros, Radians, Torque};
+use haptic_core::safety::hands::{ACTS, FELT, HELD, HandsState};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use super::{AT_COLUMN, AT_WHEEL, observer};
+
+/// The smallest step of torque and angle, N.m and rad.
+const BIT: f64 = 1.0 / 16_777_216.0;
 
 /// A jump begins anew with the wheel at rest, so that the hands are what the bar says; a smaller one is taken for a turn.
 #[test]
@@ -29,6 +33,52 @@ fn a_jump_of_the_angle_begins_anew_and_a_smaller_one_does_not() {
     }
 }
 
+/// A wheel at rest without a torque is predicted where it was, so that a step of the angle is the whole error.
+#[test]
+fn a_step_of_exactly_one_radian_is_no_jump() {
+    for side in [1.0, -1.0] {
+        for (step_rad, is_anew) in [(1.0, false), (1.0 + BIT, true)] {
+            let (observer, mut state) = (observer(&AT_WHEEL), State::NEW);
+            let _ = observer.step(&mut state, Torque::ZERO, Some(Radians::ZERO));
+            let angle = Radians::from_rad(side * step_rad);
+            let hands = observer.step(&mut state, Torque::ZERO, Some(angle));
+            assert_eq!(hands == Torque::ZERO, is_anew, "{side} {step_rad} {hands:?}");
+        }
+    }
+}
+
+/// A torque that may be wrong by so much is a hand beyond it: once as a change, and once beside no change.
+#[test]
+fn what_a_torque_may_be_wrong_by_is_no_hand() {
+    let (unsure, bit) = (Torque::from_nm(0.2), Torque::from_nm(BIT));
+    for side in [1.0, -1.0] {
+        let signed = |torque: Torque| if side < 0.0 { torque.opposite() } else { torque };
+        for (from, most) in [(Torque::ZERO, FELT.plus(unsure)), (HELD, HELD.plus(unsure))] {
+            for (torque, left_ms) in [(most, 500), (most.plus(bit), 0)] {
+                let mut state = HandsState::NEW;
+                state.update(signed(from), Torque::ZERO);
+                state.add_guided_time(ACTS, Micros::from_ms(500));
+                state.update(signed(torque), unsure);
+                assert_eq!(state.time_hands_off(), Micros::from_ms(left_ms), "{torque:?}");
+            }
+        }
+    }
+}
+
+/// Three lags of 1/60 s, and half of what is beyond the millisecond of a sample every 8 ms.
+#[test]
+fn the_lag_counts_how_old_a_sample_is() {
+    for (column_period_s, expected_s) in [(0.001, 0.05), (0.008, 0.0535)] {
+        let of = Params {
+            observer_bandwidth_rad_per_s: 60.0,
+            column_period_s,
+            ..AT_COLUMN
+        };
+        let lag_s = hands_lag_s(&of);
+        assert!((lag_s - expected_s).abs() < 1e-9, "{lag_s}");
+    }
+}
+
 /// The bar as the only known torque, before the first sample, up to the most that hands can do.
 #[test]
 fn hands_are_held_within_what_they_can_do() {
@@ -38,6 +88,31 @@ fn hands_are_held_within_what_they_can_do() {
             let hands = observer(&AT_WHEEL).step(&mut state, Torque::from_nm(side * bar_nm), None);
             assert!((hands.nm() - side * expected_nm).abs() < 1e-6, "{hands:?}");
         }
+    }
+}
+
+/// An angle that leaps by 0.9 rad asks for 34 N.m beside the bar; what is beyond 20 N.m is not kept for the sample that leaps back. The steps of
+/// the filter are done here in f64, with 0.1 rad for each sample.
+#[test]
+fn what_is_beyond_the_hands_is_not_kept() {
+    let (kept, period_s, inertia) = ((-0.1_f64).exp(), 1e-3, 0.044);
+    let [to_angle, to_rate] = [
+        1.0 - kept.powi(3),
+        1.5 * (1.0 - kept).powi(2) * (1.0 + kept) / period_s,
+    ];
+    let to_torque = inertia * (1.0 - kept).powi(3) / (period_s * period_s);
+    assert!(0.9 * to_torque > 34.0);
+    let rate = 0.9 * to_rate;
+    let predicted = 0.9 * to_angle + period_s * (rate + 0.5 * 20.0 * period_s / inertia);
+    let expected = 20.0 + to_torque * (-0.3 - predicted);
+    for side in [1.0, -1.0] {
+        let (observer, mut state) = (observer(&AT_WHEEL), State::NEW);
+        let told = [0.0, 0.9, -0.3].map(|angle| {
+            let angle = Radians::from_rad(side * angle);
+            observer.step(&mut state, Torque::ZERO, Some(angle)).nm()
+        });
+        assert_eq!(told[..2], [0.0, side * 20.0]);
+        assert!((side * told[2] - expected).abs() < 1e-3, "{told:?} {expected}");
     }
 }
 

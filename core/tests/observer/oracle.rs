@@ -121,6 +121,36 @@ fn fixed_point_is_within_six_millinewton_metres_of_f64() {
     assert!(worst < 6e-3 && worst > 1e-7, "{worst}");
 }
 
+/// A wheel at rest, to either side of zero, whose angle is told as a bit of the sensor more and less in turn: what each step cuts off must
+/// not add up to a friction that gives.
+#[test]
+fn a_wheel_at_rest_is_within_six_millinewton_metres_of_f64_for_300_s() {
+    let bit = 1.0 / 65_536.0;
+    for side in [1.0, -1.0] {
+        for (sample_ms, observer_bandwidth_rad_per_s) in
+            [(1, 10.0), (1, 100.0), (1, 300.0), (2, 50.0), (8, 30.0)]
+        {
+            for bar in [0.0, side * 0.3] {
+                let of = Params {
+                    column_period_s: 1e-3 * f64::from(sample_ms),
+                    observer_bandwidth_rad_per_s,
+                    ..AT_COLUMN
+                };
+                let (fixed, mut state, mut oracle) = (observer(&of), State::NEW, Oracle::default());
+                let mut worst: f64 = 0.0;
+                for k in 0..300_000_u32 {
+                    let is_more = (k / sample_ms).is_multiple_of(2);
+                    let angle = side * (0.125 + if is_more { bit } else { -bit });
+                    let angle = k.is_multiple_of(sample_ms).then_some(angle);
+                    let found = feel(&fixed, &mut state, bar, angle);
+                    worst = worst.max((found - oracle.step(&of, bar, angle)).abs());
+                }
+                assert!(worst < 6e-3 && worst > 1e-7, "{of:?} {bar}: {worst}");
+            }
+        }
+    }
+}
+
 /// Hands that push with 3 N.m, to either side, against a column that is held.
 #[test]
 fn hands_are_seen_after_the_stated_lag() {

@@ -117,3 +117,38 @@ const fn decay(x: f64) -> f64 {
 const fn scaled(value: f64, bits: u32) -> i32 {
     (value * (1_u64 << bits) as f64 + 0.5) as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Params, arm};
+
+    /// Its angle is the sum of those of the muscle, the three lags, and how old a sample is on average beyond the millisecond.
+    #[test]
+    fn the_arm_is_turned_by_each_lag_and_half_a_sample() {
+        let (turns, t_nms_s) = (15.7_f64, 0.1);
+        for (column_period_s, observer_bandwidth_rad_per_s, old_s) in [
+            (0.001, 60.0, 0.0),
+            (0.002, 200.0, 0.0005),
+            (0.008, 60.0, 0.0035),
+            (0.02, 30.0, 0.0095),
+        ] {
+            let bar = Params {
+                torque_sensor: 1.0,
+                column_period_s,
+                observer_bandwidth_rad_per_s,
+                ..Params::PAPER
+            };
+            let muscle = (turns * t_nms_s).atan();
+            let lags = 3.0 * (turns / observer_bandwidth_rad_per_s).atan();
+            let old = (turns * old_s).atan();
+            let [re, im] = arm(&bar, turns, t_nms_s);
+            assert!((im.atan2(re) - (muscle + lags + old)).abs() < 1e-9, "{bar:?}");
+            let hands = Params {
+                torque_sensor: 0.0,
+                ..bar
+            };
+            let [re, im] = arm(&hands, turns, t_nms_s);
+            assert!((im.atan2(re) - muscle).abs() < 1e-9, "{hands:?}");
+        }
+    }
+}
