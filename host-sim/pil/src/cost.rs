@@ -43,7 +43,7 @@ pub struct Cost {
     pub what: String,
     /// Frames that came and the step, in the mean.
     pub mean: f64,
-    /// The same at its worst.
+    /// The worst of these steps.
     pub worst: u32,
     /// What is done behind the step, verifying included, at its worst.
     pub worst_behind: u32,
