@@ -151,7 +151,7 @@ impl InvariantChecker {
         }
     }
 
-    /// For an ECU whose sensor is a torsion bar.
+    /// For an ECU that is told of a torsion bar.
     pub(super) fn behind_a_bar(self, is_bar: bool) -> Self {
         Self {
             bar_nm: is_bar.then(VecDeque::new),
