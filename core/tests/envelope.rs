@@ -4,7 +4,7 @@
 use haptic_core::controller::config::Config;
 use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Instant, Micros, Torque};
-use haptic_core::safety::envelope::{Envelope, EnvelopeState, LimitReason, Situation, WINDOW};
+use haptic_core::safety::envelope::{Envelope, EnvelopeState, LimitReason, Situation, WINDOW, Yielding};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -67,6 +67,7 @@ impl Case {
                 applied: Torque::from_nm(applied),
                 elapsed: Micros::from_us(self.elapsed_us),
                 driver: Torque::from_nm(self.driver),
+                yielding: Yielding::AtOnce,
             };
             let envelope = if self.distrusted {
                 &envelope.distrusted()
@@ -231,6 +232,7 @@ fn the_anchor_moves_every_250_ms_to_the_torque_applied() {
                 applied: Torque::from_nm(applied),
                 elapsed: Micros::from_ms(1),
                 driver: Torque::ZERO,
+                yielding: Yielding::AtOnce,
             };
             let now = start.after(Micros::from_us(after_us));
             let (torque, reason) = envelope.step(&mut state, now, Torque::MAX, &at);
@@ -398,6 +400,7 @@ fn random_sequences_stay_inside_the_f64_bounds_and_reach_them() {
                 applied,
                 elapsed: Micros::from_us(elapsed_us),
                 driver: driver_nm,
+                yielding: Yielding::AtOnce,
             };
             let now = Instant::from_us(now_us as u32);
             let (torque, reason) = envelope.step(&mut state, now, Torque::from_nm(wanted), &at);
@@ -427,4 +430,39 @@ fn random_sequences_stay_inside_the_f64_bounds_and_reach_them() {
     }
     println!("steps by reason: {reached:?}");
     assert!(reached[..6].iter().all(|count| *count > 50), "{reached:?}");
+}
+
+/// By hand: a hand of 10 N.m leaves nothing of 4 N.m, at 64 N.m/s; a step of 5 ms counts as 2 ms. Less an LSB of the bus.
+#[test]
+fn an_estimated_hand_is_yielded_to_at_64_nm_per_s() {
+    let lsb = 1.0 / 4096.0;
+    for sign in [1.0, -1.0] {
+        for (applied, elapsed_us, opposing, left) in [
+            (4.0, 1000, 10.0, 3.936 + lsb),
+            (4.0, 5000, 10.0, 3.872 + lsb),
+            (0.05, 1000, 10.0, 0.0),
+            // 5 - 3*(1.15 - 0.8) is 3.95, which is less than a step away; 0.7 N.m is no override.
+            (4.0, 1000, 1.15, 3.95),
+            (4.0, 1000, 0.7, 4.0),
+        ] {
+            let start = Instant::from_us(0);
+            let at = Situation {
+                applied: Torque::from_nm(sign * applied),
+                elapsed: Micros::from_us(elapsed_us),
+                driver: Torque::from_nm(-sign * opposing),
+                yielding: Yielding::Gradually,
+            };
+            let mut state = EnvelopeState::new(start);
+            let now = start.after(WINDOW);
+            let (torque, reason) = envelope(5.0).step(&mut state, now, at.applied, &at);
+            let off = torque.nm() - sign * left;
+            assert!(off.abs() < 1e-5, "{applied} {opposing}: {}", torque.nm());
+            let expected = if opposing < 0.8 {
+                LimitReason::None
+            } else {
+                LimitReason::DriverOverride
+            };
+            assert_eq!(reason, expected);
+        }
+    }
 }

@@ -10,7 +10,7 @@
 //! | window | abs(T) grows by at most 1.2 N.m in 250 ms |
 //! | wind-up | abs(T) grows by at most 4 N.m/s |
 //! | reduction | abs(T) falls by at most 8 N.m/s, a rounding toward zero included; by 32 while its lane is implausible |
-//! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
+//! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m; at once, or by at most 64 N.m/s ([`Yielding`]) |
 
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, per_second, product};
 use crate::safety::redundant::words;
@@ -86,6 +86,17 @@ pub struct Situation {
     pub elapsed: Micros,
     /// The driver's torque on the wheel.
     pub driver: Torque,
+    /// How it is yielded to.
+    pub yielding: Yielding,
+}
+
+/// How a torque yields to the driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Yielding {
+    /// In the same step: to a torque that a sensor measures.
+    AtOnce,
+    /// By at most 64 N.m/s: to an estimate. What it is made of shows the hand later, so that nobody can judge a faster fall.
+    Gradually,
 }
 
 /// Growth per [`WINDOW`].
@@ -98,6 +109,9 @@ const DISTRUSTED: i32 = 4;
 pub const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);
 /// How much the bound shrinks for each N.m of opposing torque beyond that, N.m per N.m.
 pub const OVERRIDE_SLOPE: Ratio = Ratio::from_si(3.0);
+
+/// How fast a torque yields to an estimated hand: 5 N.m are gone after 78 ms.
+const YIELD_RATE: TorqueRate = TorqueRate::from_nm_per_s(64.0);
 
 /// Length of the window. Growth is counted from an anchor that moves up every 250 ms.
 pub const WINDOW: Micros = Micros::from_ms(250);
@@ -161,9 +175,13 @@ impl Envelope {
             hold(&mut command, window.opposite(), window, LimitReason::Window);
         }
         self.hold_rates(&mut command, at);
-        // The override comes last and is not held by the reduction limit: the driver's hand wins at once. Zero is
-        // always inside these bounds, so they can only make the torque smaller.
-        let (low, high) = self.override_bounds(at.driver);
+        // The override comes last and is not held by the reduction limit: the driver's hand wins. Zero is always inside
+        // these bounds, so they can only make the torque smaller.
+        let (mut low, mut high) = self.override_bounds(at.driver);
+        if at.yielding == Yielding::Gradually {
+            let fall = fall(YIELD_RATE, at.elapsed);
+            (low, high) = (low.min(at.applied.plus(fall)), high.max(at.applied.minus(fall)));
+        }
         hold(&mut command, low, high, LimitReason::DriverOverride);
         command
     }
@@ -171,10 +189,8 @@ impl Envelope {
     /// Applies the rate limits: growth is limited because of lateral jerk, reduction because a sudden loss of torque
     /// disturbs the steering.
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
-        let elapsed = at.elapsed.min(MAX_ELAPSED);
-        let step = |rate: TorqueRate| Torque::from_fixed(per_second(rate.fixed(), elapsed));
-        let growth = step(self.wind_up);
-        let fall = step(self.reduction).minus(ROUNDING).max(Torque::ZERO);
+        let growth = within(self.wind_up, at.elapsed);
+        let fall = fall(self.reduction, at.elapsed);
         // Signs are mirrored so that the applied torque is positive.
         let mirror = at.applied < Torque::ZERO;
         let turn = |t: Torque| if mirror { t.opposite() } else { t };
@@ -209,6 +225,16 @@ impl Envelope {
         };
         (bound(driver.opposite()).opposite(), bound(driver))
     }
+}
+
+/// What a rate allows in a step. A longer pause than [`MAX_ELAPSED`] counts no more.
+fn within(rate: TorqueRate, elapsed: Micros) -> Torque {
+    Torque::from_fixed(per_second(rate.fixed(), elapsed.min(MAX_ELAPSED)))
+}
+
+/// By how much a torque may fall in a step.
+fn fall(rate: TorqueRate, elapsed: Micros) -> Torque {
+    within(rate, elapsed).minus(ROUNDING).max(Torque::ZERO)
 }
 
 /// Clamps a command; a limit that changes it becomes its reason.

@@ -6,7 +6,7 @@
 //! that a mistake there is not repeated here. It shares only the way in which memory is kept twice.
 //!
 //! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (in Handover
-//! four times as fast as elsewhere; unless the mode says that it ends at once, or the driver overrides), in a mode without
+//! four times as fast as elsewhere, with a bar eight times; unless the mode says that it ends at once, or the driver overrides), in a mode without
 //! torque, against a driver who overrides, on lane data that is too old, or, in Active, away from the torque that lane errors
 //! ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and rates over 50 ms, 0.3
 //! N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count: the envelope may still be bringing
@@ -32,7 +32,7 @@ words! {
         pub(crate) probe_mnm: i32,
         /// Equation (9), mN.m per m, per rad, per m/s, per rad/s.
         pub(crate) gains_mnm: [i32; 4],
-        /// How long a driver's torque has to last until guidance has to yield to it, and how far it may be from the hands'. With a bar
+        /// How long a driver's torque has to last until guidance has to yield to it, and how far it may be beyond the hands'. With a bar
         /// both are above zero, as it shows the wheel's inertia and friction too and the controller knows the hands later; a sensor of
         /// the hands' torque needs neither.
         pub(crate) window_us: i32,
@@ -156,6 +156,9 @@ const TOLERANCE_MNM: i32 = 3;
 /// How many times as fast a torque may fall in a handover. The lane may be implausible then, which the monitor does
 /// not know.
 const DISTRUSTED: i32 = 4;
+/// How fast a torque may fall with a bar, as it yields to hands that the bar shows later, if at all: a wheel that they throw takes up all
+/// that they do.
+pub(crate) const YIELD_MNM_PER_MS: i32 = 64;
 /// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 75 ms, three periods of the slowest
 /// host.
 const PROBE_END_US: i32 = 1_075_000;
@@ -250,17 +253,18 @@ impl Monitor {
             0
         };
         let left = if changes_sign { 0 } else { torque.saturating_abs() };
+        let driver = self.at_least(state);
         let fallen = state.step.torque_mnm.saturating_abs().saturating_sub(left);
         let may_fall = fallen <= within(self.fall_mnm_per_ms)
             || mode > LAST_WITH_TORQUE
             || (mode == HANDOVER && fallen <= within(self.fall_mnm_per_ms.saturating_mul(DISTRUSTED)))
-            || left.saturating_add(OVERRIDE_SLACK_MNM)
-                >= self.bound(state.step.torque_mnm, self.at_most(state));
+            || (self.window_us > 0 && fallen <= within(YIELD_MNM_PER_MS))
+            || left.saturating_add(OVERRIDE_SLACK_MNM) >= self.bound(state.step.torque_mnm, driver);
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
             && grown <= allowed
             && may_fall
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
-            && self.leaves_the_driver_in_charge(torque, self.at_least(state))
+            && self.leaves_the_driver_in_charge(torque, driver)
             && (mode != ACTIVE || self.follows_the_lane(state, torque));
         state.step.torque_mnm = torque;
         state.step.withdrawn |= i32::from(!agrees);
@@ -283,16 +287,6 @@ impl Monitor {
         let [low, high] = state.driver_range();
         let low = low.saturating_sub(self.margin_mnm).max(0);
         low.saturating_add(high.saturating_add(self.margin_mnm).min(0))
-    }
-
-    /// The most that a hand may have done against the torque.
-    fn at_most(&self, state: &MonitorState) -> i32 {
-        let [low, high] = state.driver_range();
-        if state.step.torque_mnm.is_negative() {
-            high.saturating_add(self.margin_mnm)
-        } else {
-            low.saturating_sub(self.margin_mnm)
-        }
     }
 
     /// `abs(T) <= L + 3*(0.8 - opposing)`.

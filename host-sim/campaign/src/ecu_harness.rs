@@ -91,7 +91,7 @@ impl<'a> EcuHarness<'a> {
                 scenario.sensor_errors().camera_latency_s > 0.0,
                 clock_base_us,
             )
-            .behind_a_bar(scenario.column().has_bar()),
+            .behind_a_bar(params.has_bar()),
             witness: Witness::new(
                 row,
                 onset,

@@ -10,7 +10,7 @@
 //! | frame | identifier, length, CRC, counter one ahead, codes that exist, spare bits zero, classes those of the faults |
 //! | limit | abs(T) <= 5 N.m |
 //! | wind-up | abs(T) grows by at most 4 N.m/s (2 ms at most count for one cycle) |
-//! | reduction | abs(T) falls by at most 8 N.m/s, 32 in a handover from an implausible lane, but for an ECU fault and a driver who overrides |
+//! | reduction | abs(T) falls by at most 8 N.m/s, 32 in a handover from an implausible lane, but for an ECU fault and a driver who overrides; behind a bar, 64 |
 //! | window | abs(T) grows by at most 1.2 N.m within any 250 ms |
 //! | override | the bound that shrinks from 0.8 N.m of opposing driver torque; behind a bar of what its readings of 0.2 s leave of it |
 //! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
@@ -34,17 +34,19 @@ use frame::{override_bounds, warned, well_formed};
 const LIMIT_NM: f64 = 5.0;
 const WIND_UP_NM_PER_S: f64 = 4.0;
 const REDUCTION_NM_PER_S: f64 = 8.0;
+/// Behind a bar guidance yields so fast to hands that nobody outside the ECU knows.
+const YIELD_NM_PER_S: f64 = 64.0;
 /// The reduction in a handover from an implausible lane.
 const LIE_NM_PER_S: f64 = 32.0;
 const WINDOW_NM: f64 = 1.2;
 const WINDOW_US: u64 = 250_000;
 const OVERRIDE_FROM_NM: f64 = 0.8;
 const OVERRIDE_SLOPE: f64 = 3.0;
-/// Behind a bar: after this time of an observer of 100 rad/s the hands are known. Meanwhile they may be as much more than passes through
-/// the bar as the wheel's friction of 0.1 N.m takes, its damping of 0.05 N.m.s/rad at 2 rad/s and its inertia of 0.044 kg.m2 at 20 rad/s2;
+/// Behind a bar: after this time of an observer of 100 rad/s guidance has yielded. Meanwhile the hands may be as much less than passes
+/// through the bar as the wheel's friction of 0.1 N.m takes, its damping of 0.05 N.m.s/rad at 3 rad/s and its inertia of 0.044 kg.m2 at 30 rad/s2;
 /// and two frames may change what is known by 50 mN.m; torques that a monitor counts in mN.m, one of them three times, are 5 more.
 const HANDS_KNOWN_US: u32 = 200_000;
-const BAR_MARGIN_NM: f64 = 1.08;
+const BAR_MARGIN_NM: f64 = 1.57;
 const BAR_SLACK_NM: f64 = 0.055;
 const TIMEOUT_US: u32 = 30_000;
 /// What an ECU that waits for three periods of a sender may wait longer where frames come up to 25 ms apart from their time.
@@ -149,7 +151,7 @@ impl InvariantChecker {
         }
     }
 
-    /// For an ECU whose sensor is a torsion bar.
+    /// For an ECU that is told of a torsion bar.
     pub(super) fn behind_a_bar(self, is_bar: bool) -> Self {
         Self {
             bar_nm: is_bar.then(VecDeque::new),
@@ -296,31 +298,31 @@ impl InvariantChecker {
         Ok(())
     }
 
-    /// The hands' torque that is certain, and the one that is furthest against a torque of this sign, N.m: the sensor's reading, or, behind
-    /// a bar, what its readings of late leave of it.
-    fn hands_nm(&self, sign: f64) -> [f64; 2] {
+    /// The hands' torque that is certain, N.m: the sensor's reading, or, behind a bar, what its readings of late leave of it.
+    fn hands_nm(&self) -> f64 {
         let Some(readings) = &self.bar_nm else {
-            return [self.driver_nm; 2];
+            return self.driver_nm;
         };
         let nm = || readings.iter().map(|(_, nm)| *nm);
         let (least, most) = (
             nm().fold(f64::INFINITY, f64::min) - BAR_MARGIN_NM,
             nm().fold(f64::NEG_INFINITY, f64::max) + BAR_MARGIN_NM,
         );
-        let certain = if least > most {
+        if least > most {
             0.0
         } else {
             least.max(0.0) + most.min(0.0)
-        };
-        [certain, if sign < 0.0 { most } else { least }]
+        }
     }
 
     fn rates(&self, status: &Status, old_nm: f64, elapsed_s: f64, now_us: u32) -> Result<(), Broken> {
         let elapsed_s = elapsed_s.min(MOST_S);
-        let (growth, fall) = (
-            WIND_UP_NM_PER_S * elapsed_s,
-            reduction_nm_per_s(status) * elapsed_s,
-        );
+        let growth = WIND_UP_NM_PER_S * elapsed_s;
+        let fall = elapsed_s
+            * match self.bar_nm {
+                Some(_) => YIELD_NM_PER_S,
+                None => reduction_nm_per_s(status),
+            };
         // In the frame in which the old torque is positive.
         let sign = if old_nm < 0.0 { -1.0 } else { 1.0 };
         let (old, new) = (old_nm.abs(), sign * status.torque_nm);
@@ -332,14 +334,13 @@ impl InvariantChecker {
             });
         }
         let column_is_known = self.true_at_us[1].is_some_and(|at| now_us.wrapping_sub(at) <= TIMEOUT_US);
-        let [certain_nm, against_nm] = self.hands_nm(sign);
+        let certain_nm = self.hands_nm();
         let (low, high) = if column_is_known {
             override_bounds(certain_nm)
         } else {
             (-LIMIT_NM, LIMIT_NM)
         };
-        let slack_nm = if self.bar_nm.is_some() { BAR_SLACK_NM } else { 0.0 };
-        let tiny_nm = TINY_NM + slack_nm;
+        let tiny_nm = TINY_NM + if self.bar_nm.is_some() { BAR_SLACK_NM } else { 0.0 };
         if !(low - tiny_nm..=high + tiny_nm).contains(&status.torque_nm) {
             return Err(Broken::Override {
                 torque: status.torque_nm,
@@ -348,13 +349,8 @@ impl InvariantChecker {
                 driver: certain_nm,
             });
         }
-        let bound = match self.bar_nm {
-            None if sign < 0.0 => -low,
-            None => high,
-            Some(_) if !column_is_known => LIMIT_NM,
-            Some(_) => override_bounds(sign * against_nm).1 - slack_nm,
-        };
-        let by_driver = new >= bound - LSB_NM - TINY_NM;
+        let bound = if sign < 0.0 { -low } else { high };
+        let by_driver = self.bar_nm.is_none() && new >= bound - LSB_NM - TINY_NM;
         let by_fault = matches!(status.mode, FAULT | LOCKED);
         // Across zero the old torque may fall all the way, and the new one grow from there.
         let low = if old > fall { old - fall } else { -growth };
@@ -478,10 +474,10 @@ fn reduction_nm_per_s(status: &Status) -> f64 {
 mod tests {
     use super::*;
 
-    /// The sensor of the hands says what they do. Behind a bar 0.2 s of readings from 2.5 to 3 N.m leave a hand of 2.5 - 1.08 N.m
-    /// for certain, and at most one of 3 + 1.08 N.m; readings of both signs, or of less than 1.08 N.m, leave none.
+    /// The sensor of the hands says what they do. Behind a bar 0.2 s of readings from 2.5 to 3 N.m leave a hand of 2.5 - 1.57 N.m
+    /// for certain; readings of both signs, or of less than 1.57 N.m, leave none.
     #[test]
-    fn readings_of_a_bar_leave_less_for_certain_and_more_against() {
+    fn readings_of_a_bar_leave_less_for_certain() {
         let of = |is_bar: bool, readings: &[f64]| {
             let mut checker = InvariantChecker::new(true, false, 0).behind_a_bar(is_bar);
             for nm in readings {
@@ -495,12 +491,10 @@ mod tests {
         let close =
             |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
         for sign in [1.0, -1.0] {
-            assert_eq!(of(false, &[-3.0 * sign]).hands_nm(sign), [-3.0 * sign; 2]);
-            let [certain, against] = of(true, &[-3.0 * sign, -2.5 * sign]).hands_nm(sign);
-            close(certain, -1.42 * sign);
-            close(against, -4.08 * sign);
-            close(of(true, &[-3.0 * sign, 0.1 * sign]).hands_nm(sign)[0], 0.0);
-            close(of(true, &[-1.07 * sign]).hands_nm(sign)[0], 0.0);
+            close(of(false, &[-3.0 * sign]).hands_nm(), -3.0 * sign);
+            close(of(true, &[-3.0 * sign, -2.5 * sign]).hands_nm(), -0.93 * sign);
+            close(of(true, &[-3.0 * sign, 0.1 * sign]).hands_nm(), 0.0);
+            close(of(true, &[-1.56 * sign]).hands_nm(), 0.0);
         }
     }
 }

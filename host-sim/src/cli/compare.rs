@@ -53,7 +53,7 @@ enum Study<'k> {
     /// Every law with every driver.
     Laws(Compare<'k>),
     /// Laws that adapt, with drivers whose K_hg follows trust.
-    Loops(Adaptation<'k>),
+    Loops(Box<Adaptation<'k>>),
 }
 
 impl<'k> Study<'k> {
@@ -61,7 +61,7 @@ impl<'k> Study<'k> {
         if Adaptation::is_in(file) {
             let mut study = Adaptation::load(file, kinds)?;
             study.level = level;
-            return Ok(Self::Loops(study));
+            return Ok(Self::Loops(Box::new(study)));
         }
         let study = Compare::load(file, kinds)?;
         Ok(Self::Laws(Compare { level, ..study }))

@@ -2,7 +2,7 @@
 
 use super::LEAST_BAND_NM;
 use crate::controller::params::Params;
-use crate::safety::monitor::Monitor;
+use crate::safety::monitor::{Monitor, YIELD_MNM_PER_MS};
 
 /// Half the monitor's band, N.m: how far an honest law may be from the monitor's coarse one. Both take rates from the
 /// same samples, the law with its filter, the monitor over 50 to 60 ms, so that they differ by the change of a rate
@@ -20,15 +20,19 @@ pub(super) const fn monitor_band_nm(p: &Params) -> f64 {
     f64::max(LEAST_BAND_NM, 2.0 * (a_rate + theta_rate + ahead) + carried)
 }
 
-/// How long a bar's torque has to last, us, until the controller knows the hands, and how far it may be from theirs meanwhile, mN.m.
-/// After ten time constants the observer's three lags leave 0.3 %. Hands that throw a wheel change its speed by 20 rad/s2, to 2 rad/s
-/// within a tenth of a second; so much of the torque goes into its friction, damping and inertia, and not through the bar.
+/// How long a bar's torque has to last, us, until guidance has yielded to the hands, and how far it may be beyond theirs meanwhile, mN.m.
+/// After two time constants the observer's three lags have let a third of a torque through; from then on the limit L goes at the rate of
+/// yielding, and the estimate settles: after ten 0.3 % are left. What lasts for a tenth of a second slows the wheel by no more than 30
+/// rad/s2, as hands would have turned it by 3 rad/s more before (8 N.m for 0.2 s: 25 rad/s2 in the world `bar`); so much of the torque
+/// comes from its friction, damping and inertia, and not from the hands.
 const fn bar_bound(p: &Params) -> [i32; 2] {
     if !p.has_bar() {
         return [0; 2];
     }
-    let window_us = 10e6 / p.observer_bandwidth_rad_per_s;
-    let margin_nm = p.wheel_friction_nm + 2.0 * p.wheel_damping_nm_s + 20.0 * p.wheel_inertia_kg_m2;
+    let each_s = 1.0 / p.observer_bandwidth_rad_per_s;
+    let yields_s = p.torque_limit_nm / YIELD_MNM_PER_MS as f64;
+    let window_us = 1e6 * (2.0 * each_s + f64::max(8.0 * each_s, yields_s));
+    let margin_nm = p.wheel_friction_nm + 3.0 * p.wheel_damping_nm_s + 30.0 * p.wheel_inertia_kg_m2;
     [(window_us + 0.5) as i32, (margin_nm * 1e3 + 0.999) as i32]
 }
 

@@ -7,8 +7,9 @@ use crate::controller::memory::ChangedParts;
 use crate::lane::LaneSample;
 use crate::law::Law;
 use crate::law::activity::Sample;
+use crate::observer::Sensor;
 use crate::quantity::{Micros, Ratio, Torque, share_of};
-use crate::safety::envelope::{LimitReason, Situation};
+use crate::safety::envelope::{LimitReason, Situation, Yielding};
 use crate::safety::faults::{Fault, FaultSet};
 use crate::safety::modes::Mode;
 use crate::safety::ramp::{pace, smaller_of_same_sign};
@@ -35,6 +36,10 @@ impl<I: Injection> Step<'_, I> {
             applied: self.applied,
             elapsed: self.elapsed,
             driver,
+            yielding: match self.sensor {
+                Sensor::Hands => Yielding::AtOnce,
+                Sensor::Bar(_) => Yielding::Gradually,
+            },
         };
         let distrusted;
         let envelope = if mode == Mode::Handover && faults.contains(Fault::LaneImplausible) {
