@@ -51,7 +51,7 @@ impl Named {
 /// A file's study, checked.
 enum Study<'k> {
     /// Every law with every driver.
-    Laws(Compare<'k>),
+    Laws(Box<Compare<'k>>),
     /// Laws that adapt, with drivers whose K_hg follows trust.
     Loops(Box<Adaptation<'k>>),
 }
@@ -64,7 +64,7 @@ impl<'k> Study<'k> {
             return Ok(Self::Loops(Box::new(study)));
         }
         let study = Compare::load(file, kinds)?;
-        Ok(Self::Laws(Compare { level, ..study }))
+        Ok(Self::Laws(Box::new(Compare { level, ..study })))
     }
 
     fn name(&self) -> &str {
