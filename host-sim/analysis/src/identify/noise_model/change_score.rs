@@ -435,7 +435,12 @@ mod tests {
                 stretch: 0,
                 from_s: 100.0 + k as f64,
                 to_s: 101.0 + k as f64,
-                score: unit * if k / 10 % 2 == 0 { 0.2 * sign } else { -0.2 * sign },
+                score: unit
+                    * if (k / 10).is_multiple_of(2) {
+                        0.2 * sign
+                    } else {
+                        -0.2 * sign
+                    },
                 gram: unit * unit.transpose(),
             };
             let mut inverse = DMatrix::zeros(LOCAL, LOCAL);
