@@ -74,7 +74,7 @@ pub fn table() -> Vec<MessageLoad> {
         .collect()
 }
 
-/// The same with what authentication adds (`core/secoc/authentication.dbc`), every sender asking for an epoch all the time.
+/// Messages with what authentication adds (`core/secoc/authentication.dbc`), every sender asking for an epoch all the time.
 #[must_use]
 pub fn table_with_proofs() -> Vec<MessageLoad> {
     let mut rows = table();

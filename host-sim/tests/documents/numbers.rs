@@ -83,7 +83,7 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
         ("mean, driver activity", "mps2-an386 mean step, driver activity"),
         ("worst, driver activity", "mps2-an386 worst step, driver activity"),
         (
-            "worst of any example: guidance is handed over",
+            "worst of any example: a torsion bar",
             "mps2-an386 worst step, any example",
         ),
     ] {

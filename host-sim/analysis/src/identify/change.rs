@@ -34,7 +34,7 @@ pub struct Power {
     pub step: Option<f64>,
     /// A change for [`BLIP_S`] that then goes back; none if none is seen.
     pub blip: Option<f64>,
-    /// A change to and fro, each way for about [`SWING_S`]; none if none is seen.
+    /// A change to and fro, each way for about 15 s; none if none is seen.
     pub swing: Option<f64>,
 }
 

@@ -9,7 +9,7 @@ use super::super::{BadInput, Outcome};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// With the proofs of an ECU that has keys, and all that belongs to them
+    /// Count the proofs of an ECU that has keys too, and all that belongs to them
     #[arg(long)]
     proofs: bool,
     #[command(flatten)]
