@@ -6,7 +6,7 @@
 //! that a mistake there is not repeated here. It shares only the way in which memory is kept twice.
 //!
 //! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (in Handover
-//! four times as fast as elsewhere, with a bar eight times; unless the mode says that it ends at once, or the driver overrides), in a mode without
+//! four times as fast as elsewhere; with a bar at 64 mN.m in a millisecond; unless the mode says that it ends at once, or the driver overrides), in a mode without
 //! torque, against a driver who overrides, on lane data that is too old, or, in Active, away from the torque that lane errors
 //! ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and rates over 50 ms, 0.3
 //! N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count: the envelope may still be bringing
@@ -26,6 +26,8 @@ words! {
         pub(crate) growth_mnm_per_ms: i32,
         /// Largest fall in one millisecond.
         pub(crate) fall_mnm_per_ms: i32,
+        /// In Handover.
+        pub(crate) handover_fall_mnm_per_ms: i32,
         /// Half the band around the torque that the lane errors ask for.
         pub(crate) band_mnm: i32,
         /// Amplitude of the probe.
@@ -155,7 +157,7 @@ const LAST_WITH_TORQUE: i32 = HANDOVER;
 const TOLERANCE_MNM: i32 = 3;
 /// How many times as fast a torque may fall in a handover. The lane may be implausible then, which the monitor does
 /// not know.
-const DISTRUSTED: i32 = 4;
+pub(crate) const DISTRUSTED: i32 = 4;
 /// How fast a torque may fall with a bar, as it yields to hands that the bar shows later, if at all: a wheel that they throw takes up all
 /// that they do.
 pub(crate) const YIELD_MNM_PER_MS: i32 = 64;
@@ -255,10 +257,13 @@ impl Monitor {
         let left = if changes_sign { 0 } else { torque.saturating_abs() };
         let driver = self.at_least(state);
         let fallen = state.step.torque_mnm.saturating_abs().saturating_sub(left);
-        let may_fall = fallen <= within(self.fall_mnm_per_ms)
+        let fall_mnm_per_ms = if mode == HANDOVER {
+            self.handover_fall_mnm_per_ms
+        } else {
+            self.fall_mnm_per_ms
+        };
+        let may_fall = fallen <= within(fall_mnm_per_ms)
             || mode > LAST_WITH_TORQUE
-            || (mode == HANDOVER && fallen <= within(self.fall_mnm_per_ms.saturating_mul(DISTRUSTED)))
-            || (self.window_us > 0 && fallen <= within(YIELD_MNM_PER_MS))
             || left.saturating_add(OVERRIDE_SLACK_MNM) >= self.bound(state.step.torque_mnm, driver);
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
             && grown <= allowed

@@ -2,7 +2,7 @@
 
 use super::LEAST_BAND_NM;
 use crate::controller::params::Params;
-use crate::safety::monitor::{Monitor, YIELD_MNM_PER_MS};
+use crate::safety::monitor::{DISTRUSTED, Monitor, YIELD_MNM_PER_MS};
 
 /// Half the monitor's band, N.m: how far an honest law may be from the monitor's coarse one. Both take rates from the
 /// same samples, the law with its filter, the monitor over 50 to 60 ms, so that they differ by the change of a rate
@@ -22,9 +22,9 @@ pub(super) const fn monitor_band_nm(p: &Params) -> f64 {
 
 /// How long a bar's torque has to last, us, until guidance has yielded to the hands, and how far it may be beyond theirs meanwhile, mN.m.
 /// After two time constants the observer's three lags have let a third of a torque through; from then on the limit L goes at the rate of
-/// yielding, and the estimate settles: after ten 0.3 % are left. What lasts for a tenth of a second slows the wheel by no more than 30
-/// rad/s2, as hands would have turned it by 3 rad/s more before (8 N.m for 0.2 s: 25 rad/s2 in the world `bar`); so much of the torque
-/// comes from its friction, damping and inertia, and not from the hands.
+/// yielding, and the estimate settles: after ten 0.3 % are left. Over a tenth of a second the wheel slows by no more than 30
+/// rad/s2: hands would have had to turn it by 3 rad/s more before (with 8 N.m for 0.2 s it is 25 rad/s2 in the world `bar`). So much of
+/// the torque comes from its friction, damping and inertia, and not from the hands.
 const fn bar_bound(p: &Params) -> [i32; 2] {
     if !p.has_bar() {
         return [0; 2];
@@ -36,6 +36,16 @@ const fn bar_bound(p: &Params) -> [i32; 2] {
     [(window_us + 0.5) as i32, (margin_nm * 1e3 + 0.999) as i32]
 }
 
+/// How fast a torque may fall that is allowed to fall so many times as fast as usual. With a bar it may yield as fast to a hand that nobody
+/// sees.
+const fn fall_mnm_per_ms(p: &Params, times: i32) -> i32 {
+    let fall = times * (p.reduction_nm_per_s + 0.999) as i32;
+    if p.has_bar() && fall < YIELD_MNM_PER_MS {
+        return YIELD_MNM_PER_MS;
+    }
+    fall
+}
+
 impl Monitor {
     /// The monitor's own limits, straight from the SI parameters and past the configuration above.
     #[must_use]
@@ -44,7 +54,8 @@ impl Monitor {
         Self {
             limit_mnm: (p.torque_limit_nm * 1e3 + 0.5) as i32,
             growth_mnm_per_ms: (p.wind_up_nm_per_s + 0.999) as i32,
-            fall_mnm_per_ms: (p.reduction_nm_per_s + 0.999) as i32,
+            fall_mnm_per_ms: fall_mnm_per_ms(p, 1),
+            handover_fall_mnm_per_ms: fall_mnm_per_ms(p, DISTRUSTED),
             band_mnm: (monitor_band_nm(p) * 1e3 + 0.5) as i32,
             probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
             gains_mnm: [

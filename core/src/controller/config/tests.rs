@@ -64,6 +64,7 @@ fn each_parameter_reaches_monitor_and_estimator() {
         // Up to whole mN.m.
         growth_mnm_per_ms: 4,
         fall_mnm_per_ms: 7,
+        handover_fall_mnm_per_ms: 28,
         band_mnm: 364,
         probe_mnm: 124,
         gains_mnm: [750, 10_000, 50, 350],
