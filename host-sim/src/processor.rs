@@ -55,7 +55,7 @@ pub fn run(
 /// What the ECU of a scenario hears, tick by tick.
 ///
 /// # Errors
-/// As [`run`], a target apart.
+/// What [`run`] finds wrong in a scenario.
 pub fn record(scenario: &Scenario) -> Result<Drive, ProcessorError> {
     check(scenario)?;
     let mut ticks = Vec::new();
