@@ -40,10 +40,8 @@ const fn bar_bound(p: &Params) -> [i32; 2] {
 /// sees.
 const fn fall_mnm_per_ms(p: &Params, times: i32) -> i32 {
     let fall = times * (p.reduction_nm_per_s + 0.999) as i32;
-    if p.has_bar() && fall < YIELD_MNM_PER_MS {
-        return YIELD_MNM_PER_MS;
-    }
-    fall
+    let yields = if p.has_bar() { YIELD_MNM_PER_MS } else { 0 };
+    if fall < yields { yields } else { fall }
 }
 
 impl Monitor {
