@@ -46,7 +46,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
     /// The torque was measured by a torsion bar below a steering wheel of this inertia (0.03 to 0.05 is usual): the torque of the
-    /// hands is made of it before the fit. Without it driver_torque_nm is taken as the torque of the hands
+    /// hands is made of it before the fit. It is known give or take 10 % (--fix wheel_inertia=J: exactly). Without it driver_torque_nm is taken as the torque of the hands
     #[arg(long, value_name = "KG_M2")]
     wheel_inertia: Option<f64>,
     /// Take the lane signals as they are: no camera noise is estimated and removed

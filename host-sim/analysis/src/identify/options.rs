@@ -25,6 +25,8 @@ pub struct Options {
     pub line: [Option<f64>; 2],
     /// Inertia of the wheel above a torsion bar that measured T_d, kg.m2; none where T_d is the torque of the hands.
     pub wheel_inertia: Option<f64>,
+    /// Whether that is known exactly: otherwise give or take 10 %.
+    pub wheel_inertia_known: bool,
     /// Whether a power assist that is not in T_h turns the wheel with the driver.
     pub assisted: bool,
     /// Known a_1, a_2, a_3.
@@ -66,6 +68,7 @@ impl Default for Options {
             k_nms_known: false,
             line: [None; 2],
             wheel_inertia: None,
+            wheel_inertia_known: false,
             assisted: false,
             a: [None; 3],
             gain: [None; 3],
@@ -183,7 +186,7 @@ impl Options {
             "k_d" => self.k_d = Some(value),
             "k_hg" => self.k_hg = Some(value),
             "k_nms" => (self.muscle.k_nms, self.k_nms_known) = (value, true),
-            "wheel_inertia" => self.wheel_inertia = Some(value),
+            "wheel_inertia" => (self.wheel_inertia, self.wheel_inertia_known) = (Some(value), true),
             "line_offset" => self.line[0] = Some(value),
             "line_bend" => self.line[1] = Some(value / BEND_RAD_S),
             "t_h_late" => self.late_s[0] = value,

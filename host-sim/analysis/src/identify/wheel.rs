@@ -20,7 +20,7 @@ pub(super) fn add_wheel(torque_nm: &mut [f64], wheel_angle_rad: &[f64], dt_s: f6
 }
 
 /// The second derivative of `u`; at the ends that of the nearest whole span.
-fn acceleration(u: &[f64], dt_s: f64) -> Vec<f64> {
+pub(super) fn acceleration(u: &[f64], dt_s: f64) -> Vec<f64> {
     let half = ((HALF_S / dt_s).round() as usize).max(COEFFICIENTS / 2);
     let weights = weights(half, dt_s);
     let last = u.len().saturating_sub(half + 1);

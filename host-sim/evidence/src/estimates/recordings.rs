@@ -1,12 +1,14 @@
 //! Drivers of a known truth, recorded as the cars of others record real people: slowly, with lane lines that are noisy, a torque in
-//! steps and a torsion bar that feels the wheel's inertia. Read by the layout `openlka`, what is made of them?
+//! steps and a torsion bar that feels the wheel's inertia. Read by the layout `openlka`, what is made of them? And what, if
+//! `identify` is told the wheel's inertia, rightly or wrongly?
 //!
 //! The lines differ in one property each, so that they tell what makes K_hg identifiable on a road.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
 use haptic_analysis::identify::{
-    Identification, Layout, Options, Recording, Traces, identify_with_noise_model, of_bytes,
+    Identification, Layout, LogError, Options, Recording, Traces, identify_with_noise_model, of_bytes,
 };
 use haptic_log::formats::Format;
 use haptic_log::trace::Trace;
@@ -33,6 +35,8 @@ pub struct Channel {
     pub probe: bool,
     /// Moment of inertia of the wheel, which lies between the hands and the torsion bar, kg.m2. Zero: the hands' torque.
     pub wheel_kg_m2: f64,
+    /// What `identify` is told of it as `--wheel-inertia`, kg.m2.
+    pub told_kg_m2: Option<f64>,
     /// Standard deviation of each lane line, m.
     pub line_noise_m: f64,
 }
@@ -42,6 +46,7 @@ const ROAD: Channel = Channel {
     length_s: 60.0,
     probe: false,
     wheel_kg_m2: 0.04,
+    told_kg_m2: None,
     line_noise_m: 0.02,
 };
 const LONG: Channel = Channel {
@@ -53,9 +58,15 @@ const FAST: Channel = Channel {
     rate_hz: 100.0,
     ..PROBED
 };
+const fn told(inertia_kg_m2: f64) -> Channel {
+    Channel {
+        told_kg_m2: Some(inertia_kg_m2),
+        ..FAST
+    }
+}
 
 /// The channels, with what each is.
-pub const CHANNELS: [(&str, Channel); 9] = [
+pub const CHANNELS: [(&str, Channel); 14] = [
     ("10 Hz, 60 s, no probe, torsion bar", ROAD),
     ("10 Hz, 130 s, no probe, torsion bar", LONG),
     ("10 Hz, 60 s, probe, torsion bar", Channel { probe: true, ..ROAD }),
@@ -76,6 +87,7 @@ pub const CHANNELS: [(&str, Channel); 9] = [
         },
     ),
     ("100 Hz, 130 s, probe, torsion bar", FAST),
+    ("100 Hz, 130 s, probe, torsion bar, its wheel told", told(0.04)),
     (
         "100 Hz, 130 s, probe, torque of the hands",
         Channel {
@@ -91,14 +103,18 @@ pub const CHANNELS: [(&str, Channel); 9] = [
             ..FAST
         },
     ),
+    ("100 Hz, 130 s, probe, torsion bar, told 10 % less", told(0.036)),
+    ("100 Hz, 130 s, probe, torsion bar, told 10 % more", told(0.044)),
+    ("100 Hz, 130 s, probe, torsion bar, told 30 % less", told(0.028)),
+    ("100 Hz, 130 s, probe, torsion bar, told 30 % more", told(0.052)),
 ];
 
 /// Records the guided drives of `plan` with `seeds` seeds from its own on by each of [`CHANNELS`], and identifies each as `identify
 /// --layout openlka` does. The corruptions of the result are the channels; no
-/// information bound is given for them.
+/// information bound is given for them. What is promised is promised of those whose wheel is told rightly or not at all.
 ///
 /// # Errors
-/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
+/// An unknown participant; a probe that the controller refuses; a recording that the layout refuses.
 pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Result<Corruptions, StudyError> {
     let layout = Layout::named("openlka")?;
     let jobs = guided(plan, seeds)?;
@@ -121,17 +137,25 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
         );
         let fit = |(_, channel): &(&str, Channel)| {
             let bytes = channel.record(&drives[usize::from(channel.probe)], &mut random);
-            let fit = identified(bytes, &layout);
+            let fit = identified(bytes, &layout, channel.told_kg_m2);
             fit.map(|fit| (compared(&truth, &fit.parameters), fit))
         };
-        Ok(CHANNELS.iter().map(fit).collect::<Vec<_>>())
+        Ok(CHANNELS.iter().map(fit).collect::<Result<Vec<_>, LogError>>()?)
     })?;
     let lines = CHANNELS.iter().enumerate().map(|(k, (name, _))| {
         let fits: Vec<([Compared; COMPARED], Identification)> =
-            found.iter().filter_map(|each| each[k].clone()).collect();
+            found.iter().map(|each| each[k].clone()).collect();
         CorruptionLine::new(name, &fits)
     });
-    let mut found = Corruptions::new(plan, seeds, lines.collect(), [f64::NAN; COMPARED]);
+    let is_judged =
+        |(_, channel): &(&str, Channel)| channel.told_kg_m2.is_none_or(|told| told == channel.wheel_kg_m2);
+    let (judged, told_wrongly) = lines
+        .zip(&CHANNELS)
+        .partition::<Vec<_>, _>(|(_, channel)| is_judged(channel));
+    let only_lines = |pairs: Vec<(CorruptionLine, _)>| pairs.into_iter().map(|(line, _)| line);
+    let judged = only_lines(judged).collect();
+    let mut found = Corruptions::new(plan, seeds, judged, [f64::NAN; COMPARED]);
+    found.lines.extend(only_lines(told_wrongly));
     let all = found
         .intervals
         .iter()
@@ -148,13 +172,20 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
     Ok(found)
 }
 
-/// None if the layout refuses the recording.
-fn identified(bytes: Vec<u8>, layout: &Layout) -> Option<Identification> {
+fn identified(
+    bytes: Vec<u8>,
+    layout: &Layout,
+    wheel_inertia: Option<f64>,
+) -> Result<Identification, LogError> {
     let how = Recording::default();
-    let (log, _) = of_bytes(bytes, Some(Format::Csv), Some(layout), &[], &how).ok()?;
-    let mut fit = identify_with_noise_model(&log, &Options::default());
+    let (log, _) = of_bytes(bytes, Some(Format::Csv), Some(layout), &[], &how)?;
+    let options = Options {
+        wheel_inertia,
+        ..Options::default()
+    };
+    let mut fit = identify_with_noise_model(&log, &options);
     fit.traces = Traces::default();
-    Some(fit)
+    Ok(fit)
 }
 
 impl Channel {
@@ -162,7 +193,7 @@ impl Channel {
     fn record(&self, drive: &Trace, random: &mut Xoshiro256PlusPlus) -> Vec<u8> {
         let mut text = String::from(
             "Time,op_lat_enable,vEgo,aEgo,latOutput,op_curvature_desired,op_curvature_actual,op_state_steer_torque,\
-             op_state_steer_angle,op_left_laneline,op_right_laneline\n",
+             op_state_steer_angle,op_left_laneline,op_right_laneline,body_yaw_angle\n",
         );
         let Ok(noise) = Normal::new(0.0, self.line_noise_m) else {
             unreachable!("the deviations are constants of 0 m and more")
@@ -172,6 +203,8 @@ impl Channel {
         let first = (60.0 * drive.sample_rate_hz) as usize;
         let rows = (self.length_s * self.rate_hz) as usize;
         let places = (0..rows).map(|row| first + row * every);
+        // The vehicle's heading since the first row, rad.
+        let mut heading = 0.0;
         for k in places.take_while(|k| k + 1 < samples.len()) {
             let now = &samples[k];
             let acceleration = 0.5
@@ -184,12 +217,17 @@ impl Channel {
             let speed = now.speed_m_per_s;
             let _ = writeln!(
                 text,
-                "{:.4},True,{speed:.4},0,{:.5},{:.7},{:.7},{torque:.2},{angle},{left:.4},{right:.4}",
+                "{:.4},True,{speed:.4},0,{:.5},{:.7},{:.7},{torque:.2},{angle},{left:.4},{right:.4},{:.5}",
                 now.time_s,
                 now.guidance_torque_nm / 3.0,
                 -now.curvature_1pm,
                 -now.yaw_rate_rad_per_s / speed,
+                PI - (heading + PI).rem_euclid(TAU),
             );
+            heading += samples[k..samples.len().min(k + every)]
+                .iter()
+                .map(|sample| sample.yaw_rate_rad_per_s / drive.sample_rate_hz)
+                .sum::<f64>();
         }
         text.into_bytes()
     }
@@ -200,7 +238,8 @@ mod tests {
     use super::*;
 
     /// Every row of a drive that is a straight line, by hand: 1 N.m and 0.2 rad/s2 at a wheel of 0.04 kg.m2 are 0.992 N.m, which is
-    /// 0.99 in steps of 0.01; 0.1 rad are 5.7296 deg, 5.75 in steps of 1/16; lines 0.3 m to the left of the car's are at 1.8 m.
+    /// 0.99 in steps of 0.01; 0.1 rad are 5.7296 deg, 5.75 in steps of 1/16; lines 0.3 m to the left of the car's are at 1.8 m; 0.04 rad/s
+    /// for 0.1 s are 0.004 rad, negative to the left.
     #[test]
     fn a_row_is_what_the_car_would_write() {
         let sample = |k: u32| {
@@ -230,7 +269,7 @@ mod tests {
         assert_eq!(rows.len(), 20, "2 s at 10 Hz");
         assert_eq!(
             rows[1],
-            "60.1000,True,20.0000,0,0.10000,-0.0020000,-0.0020000,0.99,5.75,-1.5000,2.1000"
+            "60.1000,True,20.0000,0,0.10000,-0.0020000,-0.0020000,0.99,5.75,-1.5000,2.1000,-0.00400"
         );
     }
 }

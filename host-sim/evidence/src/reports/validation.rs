@@ -83,7 +83,8 @@ impl Validation {
             Self::Random(r) => random::summary(r),
             Self::Recordings(r) => format!(
                 "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
-                 between it and the hands; each lane line has noise of 2 cm where nothing else is said.",
+                 between it and the hands; each lane line has noise of 2 cm where nothing else is said. A wheel that is told wrongly \
+                 is in the table and not in these sums.",
                 of_plan(r.seeds, &r.plan),
                 r.false_identifications,
                 r.identified,

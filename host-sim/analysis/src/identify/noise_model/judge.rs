@@ -10,7 +10,7 @@ use super::sums::Rows;
 use super::uncertainty::Doubts;
 use super::{
     Assumed, COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem, SMALLEST_ERROR_NM,
-    START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS,
+    START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS, WHEEL,
 };
 use crate::identify::balance::Balance;
 use crate::identify::change::{BLIP_S, Change, Power, SWING_S, Shape};
@@ -176,7 +176,8 @@ impl Problem<'_> {
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
             Some(inertia) => format!(
-                "driver_torque_nm is that of a torsion bar below a wheel of {inertia} kg.m2: the torque of the hands was made of it"
+                "driver_torque_nm is that of a torsion bar below a wheel of {inertia} kg.m2{}: the torque of the hands was made of it",
+                if options.wheel_inertia_known { "" } else { ", give or take 10 %, which the errors hold" }
             ),
             None => "driver_torque_nm is the torque of the hands: no wheel turns between them and the sensor".to_owned(),
         });
@@ -372,9 +373,15 @@ impl Problem<'_> {
             let Some(a) = alternatives.iter().find(|a| a.place == known.place) else {
                 continue;
             };
-            let (before, seen) = (known.sd.powi(2), a.error.powi(2));
-            let variance = before * seen / (before + seen);
+            // Of a wheel's inertia the record says nothing: the steps of its angle make accelerations of their own.
+            let seen = if known.place == WHEEL {
+                f64::INFINITY
+            } else {
+                a.error.powi(2)
+            };
+            let before = known.sd.powi(2);
             let share = before / (before + seen);
+            let variance = before * (1.0 - share);
             let step = a.step * share;
             let drawn_with = drawn_with.filter(|_| known.place == T_NMS);
             let with = |i: usize| drawn_with.map_or(0.0, |c| share * c[i]);

@@ -50,6 +50,7 @@ use super::result::{Identification, SAME_LINE, Start};
 use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
 use super::signals::{Muscle, Signals};
 use super::switches::Switches;
+use super::wheel::acceleration;
 
 /// Longest delay that is searched, s: twice table 4's, to hold the paper's inattentive driver (0.5 s).
 pub const LONGEST_DELAY_S: f64 = 0.6;
@@ -73,7 +74,9 @@ const K_NMS: usize = 9;
 const T_NMS: usize = 10;
 const H_LATE: usize = 11;
 const D_LATE: usize = 12;
-const COUNT: usize = 13;
+/// Inertia of the wheel above a torsion bar.
+const WHEEL: usize = 13;
+const COUNT: usize = 14;
 /// Keys of the parameters that are the driver's and the sensors', by place. The constants of the stretches follow.
 const NAMES: [Option<&str>; COUNT] = [
     Some("gain_1"),
@@ -89,6 +92,7 @@ const NAMES: [Option<&str>; COUNT] = [
     Some("t_nms"),
     Some("t_h_late"),
     Some("t_d_late"),
+    Some("wheel_inertia"),
 ];
 
 /// Widths of the variation intervals (see [`super::result`]): table 4 times the default K_d + K_nms = 4.
@@ -106,6 +110,7 @@ const VARIATION_WIDTHS: [f64; COUNT] = [
     0.2,
     0.1,
     0.1,
+    0.04,
 ];
 
 /// The turn of the road in a bend of 300 m at 60 km/h, rad/s: what a line in bends is judged by.
@@ -135,6 +140,8 @@ const T_NMS_SD_S: f64 = 0.03;
 /// The standard deviation of K_nms about the value assumed, N.m/rad: stiffnesses from half of table 4's to half as much again
 /// are usual.
 const K_NMS_SD: f64 = 0.25;
+/// The standard deviation of a wheel's inertia about what the caller says, as a share: a wheel is seldom weighed.
+const WHEEL_SHARE: f64 = 0.1;
 /// Where both are searched once they are freed, N.m/rad and s.
 const K_NMS_SEARCHED: [f64; 2] = [0.0, 4.0];
 const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
@@ -187,9 +194,12 @@ struct Assumed {
 struct Problem<'a> {
     log: &'a DriveLog,
     muscle: Muscle,
-    /// What is taken as known give or take something: K_nms, t_nms, the instants of a probe's switches, the driver's line.
+    /// What is taken as known give or take something: K_nms, t_nms, a wheel's inertia, the instants of a probe's switches, the driver's
+    /// line.
     assumed: Vec<Assumed>,
     signals: Signals,
+    /// phi'', where a wheel turns above a torsion bar.
+    wheel_acceleration: Option<Vec<f64>>,
     bounds: Vec<Bounds>,
     /// Rows that the loss is taken over.
     stretches: Vec<Range<usize>>,
@@ -264,6 +274,8 @@ impl<'a> Problem<'a> {
         for (i, (&value, range)) in known.iter().zip(&options.estimate).enumerate() {
             bounds[K_NMS + i] = range.map_or(Bounds::new(value, value), |[low, high]| Bounds::new(low, high));
         }
+        let inertia = options.wheel_inertia.unwrap_or(0.0);
+        bounds[WHEEL] = Bounds::new(inertia, inertia);
         let untimed = Switches::of(log).are_untimed();
         // Anywhere in a row: its standard deviation is that over the root of twelve.
         let of_row_s = log.dt_s / 12.0_f64.sqrt();
@@ -271,6 +283,12 @@ impl<'a> Problem<'a> {
         let assumed = [
             (!options.k_nms_known, K_NMS, muscle.k_nms, K_NMS_SD),
             (!options.t_nms_known, T_NMS, muscle.t_nms_s, T_NMS_SD_S),
+            (
+                inertia > 0.0 && !options.wheel_inertia_known,
+                WHEEL,
+                inertia,
+                WHEEL_SHARE * inertia,
+            ),
             (
                 untimed && options.estimate[2].is_none(),
                 H_LATE,
@@ -288,6 +306,9 @@ impl<'a> Problem<'a> {
                 .map(|(_, place, value, sd)| Assumed { place, value, sd })
                 .collect(),
             signals,
+            wheel_acceleration: options
+                .wheel_inertia
+                .map(|_| acceleration(&log.wheel_angle_rad, log.dt_s)),
             bounds,
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],
@@ -455,6 +476,7 @@ impl<'a> Problem<'a> {
         point[..LINEAR].copy_from_slice(&START);
         point[K_NMS] = self.muscle.k_nms;
         point[T_NMS] = self.muscle.t_nms_s;
+        point[WHEEL] = self.bounds[WHEEL].low;
         point[RHO] = (-std::f64::consts::TAU * corner_hz * self.signals.dt_s).exp();
         for (x, b) in point.iter_mut().zip(&self.bounds) {
             *x = x.clamp(b.low, b.high);

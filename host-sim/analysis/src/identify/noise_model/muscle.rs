@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::evidence::Alternative;
-use super::{Assumed, K_NMS, NAMES, Problem, T_NMS, T_NMS_RANGE_S};
+use super::{Assumed, K_NMS, NAMES, Problem, T_NMS, T_NMS_RANGE_S, WHEEL};
 use crate::identify::result::{Identification, Refutation};
 use crate::identify::verdict;
 
@@ -26,7 +26,7 @@ impl Problem<'_> {
     ) -> Vec<(f64, Refutation)> {
         let likeliest = alternatives
             .iter()
-            .filter(|a| a.place >= K_NMS)
+            .filter(|a| (K_NMS..WHEEL).contains(&a.place))
             .filter(|a| a.z.abs() > verdict::CERTAIN && self.matters(a, p, errors))
             .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()));
         let mut out = Vec::new();
