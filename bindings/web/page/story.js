@@ -14,10 +14,17 @@ function law(see) {
 // A centimetre and a hundredth of a newton metre: a person, a road and a car differ by more than the next digit.
 const f2 = value => value === null || value === undefined ? "?" : value.toFixed(2);
 const LEAST = 0.005;
+// A difference of two values as they are shown: what stands beside it adds up.
+const shownBy = (more, less) => Number((f2(more) - f2(less)).toFixed(2));
 // A value with the digits that its standard deviation leaves.
 const sure = (value, deviation) => { const digits = deviation >= 0.095 ? 1 : 2; return `${value.toFixed(digits)} ± ${deviation.toFixed(digits)}`; };
 const peak = result => result?.metrics?.peak_lateral_error_m;
 const after = result => result?.metrics?.peak_lateral_error_after_failure_m;
+// The largest of a channel in the measured bend; or to its end, from an instant on, as after a failure.
+function most({ channels }, channel, at) {
+  const { s, time } = channels, [from_m, to_m] = windowOf({});
+  return channels[channel].reduce((largest, value, i) => s[i] <= to_m && (at === undefined ? s[i] >= from_m : time[i] >= at) ? Math.max(largest, Math.abs(value)) : largest, 0);
+}
 const effort = result => result?.metrics?.mean_abs_driver_torque_nm;
 
 const error = (drive, name, kind) => ({ drive, channel: "error", name, kind });
@@ -62,10 +69,9 @@ const STEPS = {
     }[s.part] ?? panel("c_error", "m", [error("now", "", "now")])],
     controls: [],
     says: ({ now }) => {
-      const most = channel => Math.max(...now.channels[channel].map((value, i) => now.channels.s[i] >= 1080 && now.channels.s[i] <= 1740 ? Math.abs(value) : 0));
       const guidance = now.metrics.mean_abs_guidance_torque_nm;
       return t(STRINGS.en[`said_loop_${s.part}`] ? `said_loop_${s.part}` : "said_loop", { driver: f2(effort(now)), guidance: f2(guidance), peak: f2(peak(now)),
-        wheel: (180 / Math.PI * most("wheel")).toFixed(0), e_y: f2(most("e_y")), held: f2(0.5 * guidance) });
+        wheel: (180 / Math.PI * most(now, "wheel")).toFixed(0), e_y: f2(most(now, "e_y")), held: f2(0.5 * guidance) });
     },
   }),
   guidance: s => ({
@@ -114,7 +120,7 @@ const STEPS = {
       controls: [INSTANT, THREE],
       right: r => { const all = swings(r); return all[0][1] - all.at(-1)[1] < LEAST ? "same" : all[0][0]; },
       says: r => {
-        const all = swings(r), none = peak(r[`none${s.who}`]);
+        const all = swings(r), none = most(r[`none${s.who}`], "error", s.at);
         return [t("said_failure", { at: s.at.toFixed(1), t_p: s.who.toFixed(1), high: f2(after(r[`high${s.who}`])), mid: f2(after(r[`mid${s.who}`])), low: f2(after(r[`low${s.who}`])), none: f2(none) }),
           t(all[0][1] - all.at(-1)[1] < LEAST ? "failure_alike" : `failure_${all[0][0]}`), r.all_high ? ofInstants(r.all_high.peaks, t("high_short")) : ""].join("\n").trim();
       },
@@ -122,18 +128,18 @@ const STEPS = {
   },
   handover: (s, say) => {
     const driver = { t_p: s.who, ...onLine(s.k_hg) }, asks = { who: t(WHO[s.who]), at: s.at.toFixed(1), k_hg: s.k_hg.toFixed(2) };
-    const saved = r => ({ added: after(r.sudden) - after(r.none), saved: after(r.sudden) - after(r.handed) });
+    const none = r => most(r.none, "error", s.at);
     return {
       drives: { handed: { ...driver, fail: "input", at: s.at }, sudden: { ...driver, fail: "torque", at: s.at }, none: driver, all: { ...driver, sweep: sweepOf("torque", "input") } }, plays: "handed", asks,
       panels: [panel("c_error", "m", [error("none", t("no_failure"), "manual"), error("sudden", t("sudden"), "high"), error("handed", t("handed"), "low")], { least: 0.25, handle: instantOf(s, say), marksOf: "handed" }),
         panel("c_guidance", "N.m", [{ drive: "none", channel: "guidance", name: t("no_failure"), kind: "manual" }, { drive: "sudden", channel: "guidance", name: t("sudden"), kind: "high" }, { drive: "handed", channel: "guidance", name: t("handed"), kind: "low" }], { marksOf: "handed" }),
         everyInstant(s, say, [["all", "torque", t("sudden"), "high"], ["all", "input", t("handed"), "low"]], { who: `${t(WHO[s.who])}, K_hg ${s.k_hg.toFixed(2)}` })],
       controls: [INSTANT, RESISTS, THREE],
-      right: r => { const by = saved(r); return by.added < LEAST || by.saved < 0.1 * by.added ? "nothing" : by.saved > 0.5 * by.added ? "most" : "some"; },
+      right: r => { const added = after(r.sudden) - none(r), saved = after(r.sudden) - after(r.handed); return added < LEAST || saved < 0.1 * added ? "nothing" : saved > 0.5 * added ? "most" : "some"; },
       says: r => {
-        const by = saved(r).saved, word = Math.abs(by) < LEAST ? "handover_same" : by > 0 ? "handover_better" : "handover_worse";
-        return [t("said_handover", { at: s.at.toFixed(1), sudden: f2(after(r.sudden)), handed: f2(after(r.handed)), none: f2(peak(r.none)) }), t(word, { by: f2(Math.abs(by)) }),
-          r.all ? ofInstants(r.all.peaks, t("high_this", { k_hg: s.k_hg.toFixed(2) })) : ""].join(" ").trim();
+        const by = shownBy(after(r.sudden), after(r.handed)), added = shownBy(after(r.sudden), none(r)), word = by === 0 ? "handover_same" : by > 0 ? "handover_better" : "handover_worse";
+        return [t("said_handover", { at: s.at.toFixed(1), sudden: f2(after(r.sudden)), handed: f2(after(r.handed)), none: f2(none(r)) }), t(added > 0 ? "handover_adds" : "handover_adds_nothing", { added: f2(added) }), t(word, { by: f2(Math.abs(by)) }),
+          r.all ? ofInstants(r.all.peaks, t("high_this")) : ""].join(" ").trim();
       },
     };
   },
