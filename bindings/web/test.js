@@ -175,8 +175,9 @@ async function compare() {
   $("read").click();
   check("a notice that is read goes", $("notice").hidden, "");
   location.hash = "#step=compare&a.law=magic&b.course=nowhere.xodr";
-  await until("a refusal", () => $("wrong").textContent.includes("nowhere.xodr"));
-  check("a link to what is not here", true, $("wrong").textContent);
+  await until("a refusal", () => ["nowhere.xodr", "magic"].every(what => $("wrong").textContent.includes(what)));
+  await settled("compare");
+  check("a link to what is not here", said() === "" && !document.querySelector(".plot polyline:not([points=''])") && $("figures").hidden, $("wrong").textContent);
   location.hash = link;
   await settled("compare");
   const drawn = page.picture(page.charts().map(({ host }) => host), "A and B");

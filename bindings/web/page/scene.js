@@ -28,6 +28,8 @@ class Scene {
     this.#wheel(instant, width, height);
   }
 
+  clear() { this.#canvas.width = 0; }
+
   // Whether a pointer is on the steering wheel.
   isWheel(event) {
     const box = this.#canvas.getBoundingClientRect(), { x, y, radius } = this.#rim(box.width, box.height);
