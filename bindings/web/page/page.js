@@ -61,11 +61,11 @@ function instants(settings, { channels, failed_s }) {
       // A torque that is lost is gone, whatever mode the ECU takes afterwards.
       if (lost !== null && time[i] > lost) break;
       const words = [];
-      if (mode[i] !== mode[i - 1]) words.push(MODES[mode[i]] ?? mode[i]);
+      if (mode[i] !== mode[i - 1]) words.push(t("mark_mode", { mode: MODES[mode[i]] ?? mode[i] }));
       if (warning[i] && !warning[i - 1]) words.push(t("mark_warning"));
       if (words.length) marks.push({ x: time[i], name: words.join(", "), kind: warning[i] ? "warning" : "mode" });
       if (mode[i] !== mode[i - 1]) from = time[i];
-      if ((mode[i] === 3 || mode[i] === 4) && (mode[i + 1] !== mode[i])) spans.push({ from, to: time[i], kind: "handover" });
+      if ((mode[i] === 3 || mode[i] === 4) && (mode[i + 1] !== mode[i])) spans.push({ from: settings.fail === "input" ? Math.min(from, settings.at) : from, to: time[i], kind: "handover" });
     }
   }
   return { marks, spans };
@@ -136,7 +136,7 @@ function options(control) {
 function made(control) {
   const id = `c-${control.of ?? ""}${control.key}`;
   const label = t(control.label ?? (control.key === "shown" ? "who" : control.key === "who" ? "driver" : control.key));
-  const help = STRINGS.en[`${control.key}_help`] ? el("small", {}, t(`${control.key}_help`)) : "";
+  const words = control.help ?? `${control.key}_help`, help = STRINGS.en[words] ? el("small", {}, t(words)) : "";
   if (control.kind === "slider") {
     const value = el("output", { for: id }), input = el("input", { type: "range", id, min: control.min, max: control.max, step: control.step, oninput: event => chosen(control, Number(event.target.value)) });
     const ends = control.low ? el("span", { class: "ends" }, el("span", {}, t(control.low)), el("span", {}, t(control.high))) : "";
