@@ -9,8 +9,8 @@ const WAYS = [
   { way: "M49,92 V31 H138", lit: ["e_y", 0.15], part: "driver" },
   { way: "M49,136 V199 H138", lit: ["e_y", 0.15], part: "ecu" },
   { way: "M250,31 H358 V62", lit: ["driver", 0.6], kind: "driver", text: [264, 24], symbol: "T_d", part: "driver" },
-  { way: "M250,199 H272 V92 H306", lit: ["guidance", 0.5], kind: "guidance", text: [262, 152], anchor: "end", symbol: "T_h", part: "ecu" },
-  { way: "M358,106 V146", lit: ["wheel", 0.2], text: [346, 131], anchor: "end", symbol: "phi", part: "wheel", degrees: true },
+  { way: "M250,199 H264 V92 H306", lit: ["guidance", 0.5], kind: "guidance", text: [254, 152], anchor: "end", symbol: "T_h", part: "ecu" },
+  { way: "M358,106 V146", lit: ["wheel", 0.2], text: [350, 131], anchor: "end", symbol: "phi", part: "wheel", degrees: true },
   { way: "M358,190 V240 H20 V136", lit: ["error", 0.15], text: [186, 256], symbol: "error", part: "car" },
   { way: "M160,176 V54", lit: ["guidance", 0.5], kind: "guidance dashed", text: [154, 120], anchor: "end", part: "felt", word: "loop_felt" },
 ];
@@ -70,7 +70,7 @@ class Needle {
   constructor(host) {
     this.#host = host;
     this.#fan = svg("path", { class: "fan" });
-    this.#hand = svg("line", { x1: 110, y1: 100, x2: 110, y2: 24, class: "hand" });
+    this.#hand = svg("line", { x1: 110, y1: 100, x2: 110, y2: 38, class: "hand" });
     this.#truth = svg("path", { d: "M110,6 l7,-12 h-14 z", class: "truth" });
     this.#text = svg("text", { x: 110, y: 128, "text-anchor": "middle", class: "value" });
     this.#root = svg("svg", { viewBox: "0 -10 220 146", class: "needle", role: "img" }, this.#fan, svg("path", { d: "M20,100 A90,90 0 0 1 200,100", class: "rim" }));
@@ -79,7 +79,7 @@ class Needle {
       this.#root.append(svg("text", { x, y: y + 4, "text-anchor": "middle", class: "tick" }, k.toFixed(1)));
     }
     this.#root.append(this.#truth, this.#hand, this.#text);
-    host.replaceChildren(this.#root);
+    host.replaceChildren(this.#root, el("small", {}, t("needle_key")));
   }
 
   #angle(k_hg) { return Math.PI * Math.min(1.2, Math.max(0, k_hg)) / 1.2; }

@@ -61,11 +61,11 @@ function instants(settings, { channels, failed_s }) {
       // A torque that is lost is gone, whatever mode the ECU takes afterwards.
       if (lost !== null && time[i] > lost) break;
       const words = [];
-      if (mode[i] !== mode[i - 1]) words.push(MODES[mode[i]] ?? mode[i]);
+      if (mode[i] !== mode[i - 1]) words.push(t("mark_mode", { mode: MODES[mode[i]] ?? mode[i] }));
       if (warning[i] && !warning[i - 1]) words.push(t("mark_warning"));
       if (words.length) marks.push({ x: time[i], name: words.join(", "), kind: warning[i] ? "warning" : "mode" });
       if (mode[i] !== mode[i - 1]) from = time[i];
-      if ((mode[i] === 3 || mode[i] === 4) && (mode[i + 1] !== mode[i])) spans.push({ from, to: time[i], kind: "handover" });
+      if ((mode[i] === 3 || mode[i] === 4) && (mode[i + 1] !== mode[i])) spans.push({ from: settings.fail === "input" ? Math.min(from, settings.at) : from, to: time[i], kind: "handover" });
     }
   }
   return { marks, spans };
@@ -100,7 +100,8 @@ function drawCharts() {
   }
   panels.forEach((panel, i) => {
     const x = [clock.from, clock.to], lines = panel.lines.map(line => lineOf(line, x)).filter(Boolean);
-    if (!lines.length && !panel.still) return;
+    // What was never driven has no picture yet; what is refused has one without lines.
+    if (!lines.length && !panel.still && !charts[i].chart.given) return;
     const marks = [], spans = [];
     for (const drive of panel.still ? [] : panel.marksOf ? [panel.marksOf] : [...new Set(panel.lines.map(line => line.drive))]) {
       if (!results[drive]?.channels) continue;
@@ -135,7 +136,7 @@ function options(control) {
 function made(control) {
   const id = `c-${control.of ?? ""}${control.key}`;
   const label = t(control.label ?? (control.key === "shown" ? "who" : control.key === "who" ? "driver" : control.key));
-  const help = STRINGS.en[`${control.key}_help`] ? el("small", {}, t(`${control.key}_help`)) : "";
+  const words = control.help ?? `${control.key}_help`, help = STRINGS.en[words] ? el("small", {}, t(words)) : "";
   if (control.kind === "slider") {
     const value = el("output", { for: id }), input = el("input", { type: "range", id, min: control.min, max: control.max, step: control.step, oninput: event => chosen(control, Number(event.target.value)) });
     const ends = control.low ? el("span", { class: "ends" }, el("span", {}, t(control.low)), el("span", {}, t(control.high))) : "";
@@ -194,13 +195,13 @@ function render() {
   const before = last[S.step] ?? {};
   results = {};
   let missing = 0;
-  wrong("");
+  const refused = [...new Set(found.map(drive => drive?.wrong).filter(Boolean))];
+  wrong(refused.length ? t("wrong_drive", { what: refused.join("; ") }) : "");
   keys.forEach((key, i) => {
     if (!found[i] && !isLive) missing++;
-    if (found[i]?.wrong) wrong(t("wrong_drive", { what: found[i].wrong }));
     results[key] = (found[i]?.channels || found[i]?.peaks) && !found[i].fault ? found[i] : before[key];
-    // Peaks of other settings say nothing of these.
-    if (view.drives[key].sweep && !found[i]?.peaks) delete results[key];
+    // A drive that is refused leaves nothing, and peaks of other settings say nothing of these.
+    if (found[i]?.wrong || (view.drives[key].sweep && !found[i]?.peaks)) delete results[key];
   });
   if (isLive && live.settings) results.now = live.result();
   if (!missing) last[S.step] = { ...results };
@@ -223,6 +224,7 @@ function render() {
   $("editor").hidden = !view.editor;
   $("live").hidden = $("found").hidden = $("felt").hidden = !isLive;
   $("player").hidden = isLive;
+  drawPlay();
   $("play").disabled = $("time").disabled = isAsked(S);
   if (view.editor) drawLaw(found[0]);
   if (isLive) drawLive();
@@ -236,8 +238,7 @@ function render() {
 
 // The stretch of time that is shown and played.
 function range() {
-  const shown = results[view.plays]?.channels?.time;
-  const end = shown?.length ? Math.max(...Object.values(results).map(result => result?.channels?.time.at(-1) ?? 0)) : 1;
+  const end = Math.max(1, ...Object.values(results).map(result => result?.channels?.time.at(-1) ?? 0));
   const paper = Object.values(view.drives).every(settings => isPaper(settings)) && S.step !== "drive";
   [clock.from, clock.to] = paper && !view.whole ? STORY_S : paper ? [60, Math.max(61, end)] : [0, Math.max(10, end)];
   const key = `${S.step} ${clock.from}`;
@@ -273,6 +274,10 @@ function frame(time) {
       else if (clock.playing) clock.at += gone * 1e-3 * (view.rate ?? 1);
       if (clock.at > clock.to || clock.at < clock.from) clock.at = clock.from;
       paint(instantAt(result, clock.at), result.road, view.drives[view.plays]);
+    } else if (document.body.dataset.done) {
+      // What was to be shown is refused.
+      scene.clear();
+      $("at").textContent = "";
     }
   }
   frames.push(performance.now() - began);
@@ -291,5 +296,6 @@ function paint(now, road, settings) {
   if (document.activeElement !== $("time")) $("time").value = clock.at;
   $("time").setAttribute("aria-valuetext", `${now.time_s.toFixed(1)} s`);
   $("at").textContent = `${now.time_s.toFixed(1)} s${(view.rate ?? 1) === 1 ? "" : ` (${view.rate}${t("rate")})`}`;
-  $("play").textContent = t(clock.playing ? "pause" : "play");
+  drawPlay();
 }
+function drawPlay() { $("play").textContent = t(clock.playing ? "pause" : "play"); }

@@ -112,15 +112,16 @@ function listenFelt() {
 async function share(kind) {
   const note = text => { $("shared").textContent = text; };
   const isLive = S.step === "drive", settings = view.drives[view.plays], name = `haptic-${S.step}`;
+  const keep = (file, type, content) => { save(file, type, content); note(t("shared_saved", { file })); };
   if (!results[view.plays]?.channels) { note(t("shared_not")); return; }
   if (kind === "link") {
     const link = location.href;
     try { await navigator.clipboard.writeText(link); note(t("shared_link")); } catch { note(t("shared_link_shown", { link })); }
-  } else if (kind === "svg") save(`${name}.svg`, "image/svg+xml", picture(charts.map(({ host }) => host), t(`${S.step}_head`)).text);
-  else if (kind === "png") save(`${name}.png`, "image/png", await png(picture(charts.map(({ host }) => host), t(`${S.step}_head`))));
+  } else if (kind === "svg") keep(`${name}.svg`, "image/svg+xml", picture(charts.map(({ host }) => host), t(`${S.step}_head`)).text);
+  else if (kind === "png") keep(`${name}.png`, "image/png", await png(picture(charts.map(({ host }) => host), t(`${S.step}_head`))));
   else if (kind === "csv") {
     const csv = isLive ? live.csv() : (await drives.ask(jobOf(settings, { csv: true, steps: 1e6 }))).csv;
-    if (csv) save(`${name}.csv`, "text/csv", csv); else note(t("shared_not"));
+    if (csv) keep(`${name}.csv`, "text/csv", csv); else note(t("shared_not"));
   } else {
     const road = dropped.has(settings.course) ? ` ${t("share_road_note", { name: settings.course })}` : "";
     const law = settings.law ?? "shipping", what = isLive ? "share_person_note" : law === "own" ? "share_own_note" : law === "shipping" ? "share_toml_note" : "share_law_note";
@@ -137,7 +138,7 @@ async function take(file) {
     live.end();
     [live.asked, live.note] = ["", t("road_took", { name, km: (length_m / 1000).toFixed(1) })];
     if (S.step === "compare") { S.a.course = S.b.course = name; soon(); } else say({ step: "drive", course: name });
-  } catch (error) { notice(t("wrong_file", { name, what: error.message })); }
+  } catch (error) { notice(t("wrong_file", { what: error.message })); }
 }
 
 function listen() {

@@ -28,6 +28,8 @@ class Scene {
     this.#wheel(instant, width, height);
   }
 
+  clear() { this.#canvas.width = 0; }
+
   // Whether a pointer is on the steering wheel.
   isWheel(event) {
     const box = this.#canvas.getBoundingClientRect(), { x, y, radius } = this.#rim(box.width, box.height);
@@ -115,7 +117,7 @@ class Scene {
     const small = w < 560, size = small ? 12 : w > 1000 ? 19 : 14, foot = h - 2 * size - 12;
     const label = (name, symbol, nm, at, align, color) => {
       this.#text(small ? name : `${name} ${symbol}`, at, foot, { align, color, size, bold: true });
-      this.#text(`${Math.abs(nm).toFixed(2)} N.m ${side(nm)}`, at, foot + size + 5, { align, size });
+      this.#text(`${Math.abs(nm).toFixed(2)} N.m ${side(nm)}`.trim(), at, foot + size + 5, { align, size });
     };
     label(t("hands_driver"), "T_d", instant.driver_torque_nm, 12, "left", HANDS.driver);
     label(t("hands_guidance"), "T_h", instant.guidance_torque_nm, w - 12, "right", HANDS.guidance);
@@ -126,9 +128,10 @@ class Scene {
     if (instant.note) this.#text(instant.note, w - 12, 24, { align: "right", size: 12, bold: true, color: shade("ink") });
     if (instant.alarm) {
       pen.font = "600 15px system-ui, sans-serif";
-      const wide = pen.measureText(instant.alarm).width + 24;
-      pen.fillStyle = "#b3261e"; pen.fillRect(x - wide / 2, 54, wide, 26);
-      this.#text(instant.alarm, x, 72, { align: "center", size: 15, bold: true });
+      // Beside the arrows, where they reach that high.
+      const wide = pen.measureText(instant.alarm).width + 24, at = y - radius - 35 > 80 ? x : wide / 2 + 10;
+      pen.fillStyle = "#b3261e"; pen.fillRect(at - wide / 2, 54, wide, 26);
+      this.#text(instant.alarm, at, 72, { align: "center", size: 15, bold: true });
     }
   }
 

@@ -1,6 +1,6 @@
 // The steps: which drives each wants, which lines of them it draws, what it lets the reader set, and what it says of them.
 
-const STORY_S = [62, 106], DELAYS = [0.1, 0.3, 0.5], WHO = { 0.1: "quick", 0.3: "middle", 0.5: "slow" };
+const STORY_S = [62, 106], DELAYS = [0.1, 0.3, 0.5], WHO = { 0.1: "quick", 0.3: "medium", 0.5: "slow" };
 const LAW = `// The shipping law, equation (9).
 // Asked 1000 times a second; returns
 // a torque in N.m, to the left +.
@@ -14,10 +14,17 @@ function law(see) {
 // A centimetre and a hundredth of a newton metre: a person, a road and a car differ by more than the next digit.
 const f2 = value => value === null || value === undefined ? "?" : value.toFixed(2);
 const LEAST = 0.005;
+// A difference of two values as they are shown: what stands beside it adds up.
+const shownBy = (more, less) => Number((f2(more) - f2(less)).toFixed(2));
 // A value with the digits that its standard deviation leaves.
 const sure = (value, deviation) => { const digits = deviation >= 0.095 ? 1 : 2; return `${value.toFixed(digits)} ± ${deviation.toFixed(digits)}`; };
 const peak = result => result?.metrics?.peak_lateral_error_m;
 const after = result => result?.metrics?.peak_lateral_error_after_failure_m;
+// The largest of a channel in the measured bend; or to its end, from an instant on, as after a failure.
+function most({ channels }, channel, at) {
+  const { s, time } = channels, [from_m, to_m] = windowOf({});
+  return channels[channel].reduce((largest, value, i) => s[i] <= to_m && (at === undefined ? s[i] >= from_m : time[i] >= at) ? Math.max(largest, Math.abs(value)) : largest, 0);
+}
 const effort = result => result?.metrics?.mean_abs_driver_torque_nm;
 
 const error = (drive, name, kind) => ({ drive, channel: "error", name, kind });
@@ -25,7 +32,7 @@ const panel = (title, unit, lines, more = {}) => ({ title: t(title), unit, lines
 const instantOf = (s, say) => ({ x: s.at, from: 64, to: 100, name: t("at"), moved: at => say({ at }) });
 const slider = (key, min, max, step, unit = "", more = {}) => ({ key, kind: "slider", min, max, step, unit, ...more });
 const choice = (key, options) => ({ key, kind: "choice", options });
-const DELAY = slider("t_p", 0.1, 0.5, 0.01, "s"), INSTANT = slider("at", 64, 100, 0.5, "s");
+const DELAY = slider("t_p", 0.1, 0.5, 0.01, "s"), INSTANT = slider("at", 64, 100, 0.5, "s", { help: "at_drag" });
 const RESISTS = slider("k_hg", 0, 1, 0.05, "", { low: "k_hg_low", high: "k_hg_high" });
 const THREE = choice("who", DELAYS.map(t_p => [t_p, WHO[t_p]]));
 
@@ -62,10 +69,9 @@ const STEPS = {
     }[s.part] ?? panel("c_error", "m", [error("now", "", "now")])],
     controls: [],
     says: ({ now }) => {
-      const most = channel => Math.max(...now.channels[channel].map((value, i) => now.channels.s[i] >= 1080 && now.channels.s[i] <= 1740 ? Math.abs(value) : 0));
       const guidance = now.metrics.mean_abs_guidance_torque_nm;
       return t(STRINGS.en[`said_loop_${s.part}`] ? `said_loop_${s.part}` : "said_loop", { driver: f2(effort(now)), guidance: f2(guidance), peak: f2(peak(now)),
-        wheel: (180 / Math.PI * most("wheel")).toFixed(0), e_y: f2(most("e_y")), held: f2(0.5 * guidance) });
+        wheel: (180 / Math.PI * most(now, "wheel")).toFixed(0), e_y: f2(most(now, "e_y")), held: f2(0.5 * guidance) });
     },
   }),
   guidance: s => ({
@@ -74,7 +80,7 @@ const STEPS = {
       panel("c_torque", "N.m", [{ drive: "guided", channel: "driver", name: t("driver_torque"), kind: "driver" }, { drive: "guided", channel: "guidance", name: t("guidance_torque"), kind: "guidance" }])],
     controls: [DELAY],
     right: ({ guided, alone }) => nearer(peak(guided), peak(alone), ["less", "same", "more"]),
-    says: ({ guided, alone }) => t("said_guidance", { t_p: f2(s.t_p), alone: f2(peak(alone)), guided: f2(peak(guided)) }),
+    says: ({ guided, alone }) => t("said_guidance", { t_p: f2(s.t_p), alone: f2(peak(alone)), guided: f2(peak(guided)), effort: f2(effort(guided)), alone_effort: f2(effort(alone)) }),
   }),
   reliance: s => {
     const drives = {}, order = [s.who, ...DELAYS.filter(t_p => t_p !== s.who)];
@@ -114,7 +120,7 @@ const STEPS = {
       controls: [INSTANT, THREE],
       right: r => { const all = swings(r); return all[0][1] - all.at(-1)[1] < LEAST ? "same" : all[0][0]; },
       says: r => {
-        const all = swings(r), none = peak(r[`none${s.who}`]);
+        const all = swings(r), none = most(r[`none${s.who}`], "error", s.at);
         return [t("said_failure", { at: s.at.toFixed(1), t_p: s.who.toFixed(1), high: f2(after(r[`high${s.who}`])), mid: f2(after(r[`mid${s.who}`])), low: f2(after(r[`low${s.who}`])), none: f2(none) }),
           t(all[0][1] - all.at(-1)[1] < LEAST ? "failure_alike" : `failure_${all[0][0]}`), r.all_high ? ofInstants(r.all_high.peaks, t("high_short")) : ""].join("\n").trim();
       },
@@ -122,18 +128,18 @@ const STEPS = {
   },
   handover: (s, say) => {
     const driver = { t_p: s.who, ...onLine(s.k_hg) }, asks = { who: t(WHO[s.who]), at: s.at.toFixed(1), k_hg: s.k_hg.toFixed(2) };
-    const saved = r => ({ added: after(r.sudden) - after(r.none), saved: after(r.sudden) - after(r.handed) });
+    const none = r => most(r.none, "error", s.at);
     return {
       drives: { handed: { ...driver, fail: "input", at: s.at }, sudden: { ...driver, fail: "torque", at: s.at }, none: driver, all: { ...driver, sweep: sweepOf("torque", "input") } }, plays: "handed", asks,
-      panels: [panel("c_error", "m", [error("none", t("no_failure"), "manual"), error("sudden", t("sudden"), "high"), error("handed", t("handed"), "low")], { least: 0.25, handle: instantOf(s, say), marksOf: "handed" }),
-        panel("c_guidance", "N.m", [{ drive: "none", channel: "guidance", name: t("no_failure"), kind: "manual" }, { drive: "sudden", channel: "guidance", name: t("sudden"), kind: "high" }, { drive: "handed", channel: "guidance", name: t("handed"), kind: "low" }], { marksOf: "handed" }),
-        everyInstant(s, say, [["all", "torque", t("sudden"), "high"], ["all", "input", t("handed"), "low"]], { who: `${t(WHO[s.who])}, K_hg ${s.k_hg.toFixed(2)}` })],
+      panels: [panel("c_error", "m", [error("none", t("no_failure"), "manual"), error("sudden", t("sudden"), "now"), error("handed", t("handed"), "handed")], { least: 0.25, handle: instantOf(s, say), marksOf: "handed" }),
+        panel("c_guidance", "N.m", [{ drive: "none", channel: "guidance", name: t("no_failure"), kind: "manual" }, { drive: "sudden", channel: "guidance", name: t("sudden"), kind: "now" }, { drive: "handed", channel: "guidance", name: t("handed"), kind: "handed" }], { marksOf: "handed" }),
+        everyInstant(s, say, [["all", "torque", t("sudden"), "now"], ["all", "input", t("handed"), "handed"]], { who: `${t(WHO[s.who])}, K_hg ${s.k_hg.toFixed(2)}` })],
       controls: [INSTANT, RESISTS, THREE],
-      right: r => { const by = saved(r); return by.added < LEAST || by.saved < 0.1 * by.added ? "nothing" : by.saved > 0.5 * by.added ? "most" : "some"; },
+      right: r => { const added = after(r.sudden) - none(r), saved = after(r.sudden) - after(r.handed); return added < LEAST || saved < 0.1 * added ? "nothing" : saved > 0.5 * added ? "most" : "some"; },
       says: r => {
-        const by = saved(r).saved, word = Math.abs(by) < LEAST ? "handover_same" : by > 0 ? "handover_better" : "handover_worse";
-        return [t("said_handover", { at: s.at.toFixed(1), sudden: f2(after(r.sudden)), handed: f2(after(r.handed)), none: f2(peak(r.none)) }), t(word, { by: f2(Math.abs(by)) }),
-          r.all ? ofInstants(r.all.peaks, t("high_this", { k_hg: s.k_hg.toFixed(2) })) : ""].join(" ").trim();
+        const by = shownBy(after(r.sudden), after(r.handed)), added = shownBy(after(r.sudden), none(r)), word = by === 0 ? "handover_same" : by > 0 ? "handover_better" : "handover_worse";
+        return [t("said_handover", { at: s.at.toFixed(1), sudden: f2(after(r.sudden)), handed: f2(after(r.handed)), none: f2(none(r)) }), t(added > 0 ? "handover_adds" : "handover_adds_nothing", { added: f2(added) }), t(word, { by: f2(Math.abs(by)) }),
+          r.all ? ofInstants(r.all.peaks, t("high_this")) : ""].join(" ").trim();
       },
     };
   },
@@ -162,9 +168,9 @@ const STEPS = {
         ...(probed ? [panel("c_k_hg", "0 to 1", [{ truth: s[probed].k_hg, name: t("truth"), kind: "manual" }, { drive: probed, channel: "k_hg", name: `${probed.toUpperCase()}, ${t("told")}`, kind: probed, band: "deviation" }], { y: [-0.1, 1.3] })] : [])],
       controls: [choice("shown", [["a", "A"], ["b", "B"]]), ...of("a"), ...of("b")], numbers: true,
       says: ({ a, b }) => {
-        const by = peak(b) - peak(a), effort_by = effort(b) - effort(a), word = x => t(x > 0 ? "more_word" : "less_word");
-        return [Math.abs(by) < LEAST ? t("said_error_same", { a: f2(peak(a)), b: f2(peak(b)) }) : t("said_error", { a: f2(peak(a)), b: f2(peak(b)), by: f2(Math.abs(by)), word: word(by) }),
-          Math.abs(effort_by) < LEAST ? t("said_effort_same", { a: f2(effort(a)) }) : t("said_effort", { by: f2(Math.abs(effort_by)), word: word(effort_by) }),
+        const far = { a: f2(peak(a)), b: f2(peak(b)) }, effort_by = effort(b) - effort(a);
+        return [t(far.a === far.b ? "said_error_same" : "said_error", far),
+          Math.abs(effort_by) < LEAST ? t("said_effort_same", { a: f2(effort(a)) }) : t("said_effort", { by: f2(Math.abs(effort_by)), word: t(effort_by > 0 ? "more_word" : "less_word") }),
           s.a.remnant || s.b.remnant ? t("said_one_draw") : ""].join(" ").trim();
       },
     };
