@@ -24,14 +24,14 @@ pub(super) type Series = Vec<(Vec<f64>, f64)>;
 
 /// A fitted model.
 pub(super) struct BoxJenkins {
-    /// Of the inputs.
+    /// What each input is multiplied by.
     pub(super) weights: Vec<f64>,
     /// d_1, d_2 and c.
     pub(super) noise: [f64; NOISE],
 }
 
 impl BoxJenkins {
-    /// Of all series together; none of too few rows.
+    /// Fits all series together; none of too few rows.
     pub(super) fn fitted(series: &[&Series]) -> Option<Self> {
         let rows: Vec<(&[f64], f64)> = series
             .iter()

@@ -41,15 +41,15 @@ pub enum Model {
     /// The column's equation of motion: wheel angle, times v^2 too, its rate and acceleration, friction, lateral acceleration, roll;
     /// shared, the guidance.
     Column,
-    /// That, and a driver who sees planned curvature and lane in what it leaves.
+    /// The column first, then a driver who sees planned curvature and lane in what it leaves.
     ColumnThenDriver,
     /// A driver who sees planned curvature and lane, now and before, and never the wheel.
     Driver,
-    /// It stays as it is.
+    /// The torque stays as it is.
     Persistence,
     /// A regression on the torque's own past.
     OwnPast,
-    /// That, with planned curvature and lane.
+    /// A regression on the torque's own past, planned curvature and lane.
     Road,
     /// A Box-Jenkins model with planned curvature, lane, wheel angle and, shared, the guidance.
     BoxJenkins,
@@ -103,7 +103,7 @@ pub(super) struct Segment {
 type Samples = Vec<(Vec<f64>, f64)>;
 
 impl Segment {
-    /// Those of a recording: none where it has no road.
+    /// The parts of a recording, by hand and shared; none where it has no road.
     pub(super) fn of(rows: &Rows, file: &str) -> Vec<Self> {
         let mut steps: Vec<f64> = rows.time_s.windows(2).map(|w| w[1] - w[0]).collect();
         steps.sort_by(f64::total_cmp);
