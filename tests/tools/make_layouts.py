@@ -34,12 +34,13 @@ def rows(table, hz, seconds):
     return {name: np.interp(times, table["time_s"], table[name]) for name in table.dtype.names}
 
 
-def write(name, columns, heading=True):
+def write(name, *tables, heading=True):
+    names, columns = zip(*(column for table in tables for column in table.items()))
     with open(OUT / name, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         if heading:
-            table.writerow(columns)
-        table.writerows(zip(*columns.values()))
+            table.writerow(names)
+        table.writerows(zip(*columns))
 
 
 def openpilot_like(d, random, shared):
@@ -98,9 +99,11 @@ def main(host_sim):
     jitter = random.uniform(-0.001, 0.001, 1600)
     time = {"Time": (100 + 0.1 * np.arange(1600) + jitter).round(4)}
     driven = signals["speed"] * signals["driven"]
-    yaw = {"body_yaw_angle": (0.1 * np.cumsum(driven)).round(5)}
+    angles = {"body_yaw_angle": (0.1 * np.cumsum(driven)).round(5), "body_roll_angle": np.zeros(len(driven))}
     wrong = {"steer_torque_driver": (20_000 + random.normal(0, 300, 1600)).round(1)}
-    write("openlka.csv", time | {OPENLKA[name]: values for name, values in signals.items()} | wrong | yaw)
+    # Behind all, the time of the segment, by the name that the time of the drive has.
+    since = {"Time": (time["Time"] - time["Time"][0]).round(4)}
+    write("openlka.csv", time, {OPENLKA[name]: values for name, values in signals.items()}, wrong, angles, since)
 
     d = rows(guided, 20, 15)
     signals = openpilot_like(d, random, np.ones(300))

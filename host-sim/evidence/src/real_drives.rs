@@ -1,12 +1,15 @@
 //! Recordings of real people: which are read, what is identified in them, and how well a driver that was fitted to one half of a
-//! drive predicts the torque in the other, beside a plain linear regression.
+//! drive predicts the torque in the other, beside a plain linear regression. The segments of a vehicle are held together too
+//! (`pooled`).
 //!
 //! The variance accounted for is 1 - var(T_d - prediction)/var(T_d): the mean of the half is free, for sensors have offsets. Our
 //! driver's prediction is the simulated torque, without the disturbance model.
 
+mod box_jenkins;
 mod fed;
 mod hands;
 mod linear;
+mod pooled;
 mod reading;
 mod rows;
 #[cfg(test)]
@@ -27,6 +30,8 @@ pub use fed::{End, Ending, Fed, Feed};
 use hands::Felt;
 pub use hands::Hands;
 use linear::linear;
+pub use pooled::{Judged, Model, Pooled};
+use pooled::{Segment, pooled};
 pub use reading::Understood;
 use reading::collect;
 use rows::Rows;
@@ -45,6 +50,8 @@ pub struct RealDrives {
     pub drives: Vec<RealDrive>,
     /// Hands on the wheel, by the recordings with torque, lane and a sign of who steers; none without any.
     pub hands: Option<Hands>,
+    /// The segments of each vehicle together.
+    pub pooled: Vec<Pooled>,
 }
 
 /// Where recordings come from.
@@ -133,7 +140,8 @@ pub fn real_drives(directory: &Path, how: &Understood, watch: &Watch<'_>) -> Res
             directory.display()
         ));
     }
-    let found: Vec<FileResult<'_>> = each(&files, watch, |path| Ok(of_file(directory, path, &layouts, how)))?;
+    let mut found: Vec<FileResult<'_>> =
+        each(&files, watch, |path| Ok(of_file(directory, path, &layouts, how)))?;
     let mut sources: Vec<Source> = Vec::new();
     for layout in found.iter().filter_map(|file| file.layout) {
         let source = Source {
@@ -146,10 +154,15 @@ pub fn real_drives(directory: &Path, how: &Understood, watch: &Watch<'_>) -> Res
             sources.push(source);
         }
     }
+    let segments = found
+        .iter_mut()
+        .flat_map(|file| std::mem::take(&mut file.segments));
+    let pooled = pooled(segments.collect());
     let felt: Vec<&(Felt, Vec<Fed>)> = found.iter().filter_map(|file| file.hands.as_ref()).collect();
     Ok(RealDrives {
         sources,
         hands: Hands::new(&felt),
+        pooled,
         drives: found.into_iter().flat_map(|file| file.drives).collect(),
     })
 }
@@ -159,6 +172,8 @@ struct FileResult<'a> {
     layout: Option<&'a Layout>,
     drives: Vec<RealDrive>,
     hands: Option<(Felt, Vec<Fed>)>,
+    /// With their vehicle.
+    segments: Vec<(String, Segment)>,
 }
 
 fn of_file<'a>(
@@ -172,6 +187,7 @@ fn of_file<'a>(
         layout: None,
         drives: vec![drive],
         hands: None,
+        segments: Vec::new(),
     };
     let file = path.strip_prefix(directory).unwrap_or(path).display().to_string();
     let drive = |layout: &str, by_hand, why: Option<String>| RealDrive {
@@ -197,6 +213,9 @@ fn of_file<'a>(
         return refused(drive("", true, Some(why)));
     };
     let rows = Rows::read(layout, &bytes, format, maps);
+    let vehicle = vehicle(path, layout.vehicle_folder);
+    let segments = rows.iter().flat_map(|rows| Segment::of(rows, &file));
+    let segments = segments.map(|segment| (vehicle.clone(), segment)).collect();
     let hands = rows.map(|rows| {
         (
             Felt::new(&rows),
@@ -236,7 +255,18 @@ fn of_file<'a>(
         layout: Some(layout),
         drives,
         hands,
+        segments,
     }
+}
+
+/// The name of the folder so far up that is named after the vehicle.
+fn vehicle(path: &Path, folders: Option<usize>) -> String {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+    let folder = path
+        .ancestors()
+        .nth(folders.unwrap_or(1))
+        .and_then(Path::file_name);
+    folder.unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn judge(log: &DriveLog, by_hand: bool, how: &Understood) -> Result<Found, StudyError> {

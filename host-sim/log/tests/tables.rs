@@ -295,6 +295,27 @@ fn a_column_that_is_there_twice_is_refused_where_it_is_asked_for() {
     );
     let twice = csv("time_s,a,time_s\n0,1,0\n1,1,1\n").unwrap_err();
     assert_eq!(twice, "channel time_s is there twice");
+    // Who names the time means the first one, and the recording says so.
+    let time = "t".parse().unwrap();
+    let reading = Reading {
+        time: Some(&time),
+        ..Reading::default()
+    };
+    let found = of(formats::read_bytes(
+        "t,a,t\n5,1,0\n6,2,1\n".into(),
+        Format::Csv,
+        reading,
+    ))
+    .unwrap();
+    assert_eq!(
+        (&found.groups[0].time_s[..], names(&found)),
+        (&[5.0, 6.0][..], vec!["a".to_owned()])
+    );
+    assert!(
+        notes(&found)[0].contains("first of this name"),
+        "{:?}",
+        notes(&found)
+    );
     // Their units tell them apart, and stand in the heading once.
     let text = "time_s,a [m],a [deg]\n0,1,2\n1,1,2\n";
     assert_eq!(formats::to_csv(csv(text).unwrap()).unwrap(), text.as_bytes());

@@ -51,7 +51,7 @@ pub use result::{
     AtTNms, Combination, Correlation, Identification, InputCorrelation, OwnLine, Parameter, Parameters,
     Refutation, Remnant, Start, Torques, Traces, Whiteness,
 };
-pub use search::Termination;
+pub use search::{Bounds, Optimum, Quadratic, Termination, minimise};
 pub use signals::Muscle;
 pub use together::{identify_together, identify_together_and_track};
 pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, identify_and_track, track};

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 /// Loss, gradient and Gauss-Newton matrix at one point.
 #[derive(Debug, Clone)]
-pub(crate) struct Quadratic {
+pub struct Quadratic {
     /// The loss.
     pub loss: f64,
     /// What the loss is compared with to call an improvement small; the loss itself for a sum of squares.
@@ -27,18 +27,23 @@ pub(crate) struct Quadratic {
 
 /// Closed interval that a parameter is searched in; infinite ends mean free.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bounds {
+pub struct Bounds {
+    /// Least value.
     pub low: f64,
+    /// Largest value.
     pub high: f64,
 }
 
 impl Bounds {
-    pub(crate) const FREE: Self = Self {
+    /// None.
+    pub const FREE: Self = Self {
         low: f64::NEG_INFINITY,
         high: f64::INFINITY,
     };
 
-    pub(crate) const fn new(low: f64, high: f64) -> Self {
+    /// From one value to another.
+    #[must_use]
+    pub const fn new(low: f64, high: f64) -> Self {
         Self { low, high }
     }
 
@@ -75,11 +80,14 @@ impl fmt::Display for Termination {
 
 /// Where a search ended.
 #[derive(Debug, Clone)]
-pub(crate) struct Optimum {
+pub struct Optimum {
+    /// The parameters.
     pub point: Vec<f64>,
+    /// The loss there.
     pub quadratic: Quadratic,
     /// Loss at the start and after every accepted step.
     pub history: Vec<f64>,
+    /// Why there.
     pub termination: Termination,
 }
 
@@ -90,7 +98,7 @@ const MAX_DAMPING: f64 = 1e12;
 /// Minimises the loss that `evaluate` describes, from `start`, until the expected improvement is below
 /// `tolerance` times the scale. `evaluate` may move the point that it is given to a better one (solve for what is
 /// linear, say) and then describes the loss there.
-pub(crate) fn minimise(
+pub fn minimise(
     start: &[f64],
     bounds: &[Bounds],
     tolerance: f64,

@@ -193,7 +193,7 @@ impl Channel {
     fn record(&self, drive: &Trace, random: &mut Xoshiro256PlusPlus) -> Vec<u8> {
         let mut text = String::from(
             "Time,op_lat_enable,vEgo,aEgo,latOutput,op_curvature_desired,op_curvature_actual,op_state_steer_torque,\
-             op_state_steer_angle,op_left_laneline,op_right_laneline,body_yaw_angle\n",
+             op_state_steer_angle,op_left_laneline,op_right_laneline,body_yaw_angle,body_roll_angle\n",
         );
         let Ok(noise) = Normal::new(0.0, self.line_noise_m) else {
             unreachable!("the deviations are constants of 0 m and more")
@@ -217,7 +217,7 @@ impl Channel {
             let speed = now.speed_m_per_s;
             let _ = writeln!(
                 text,
-                "{:.4},True,{speed:.4},0,{:.5},{:.7},{:.7},{torque:.2},{angle},{left:.4},{right:.4},{:.5}",
+                "{:.4},True,{speed:.4},0,{:.5},{:.7},{:.7},{torque:.2},{angle},{left:.4},{right:.4},{:.5},0",
                 now.time_s,
                 now.guidance_torque_nm / 3.0,
                 -now.curvature_1pm,
@@ -269,7 +269,7 @@ mod tests {
         assert_eq!(rows.len(), 20, "2 s at 10 Hz");
         assert_eq!(
             rows[1],
-            "60.1000,True,20.0000,0,0.10000,-0.0020000,-0.0020000,0.99,5.75,-1.5000,2.1000,-0.00400"
+            "60.1000,True,20.0000,0,0.10000,-0.0020000,-0.0020000,0.99,5.75,-1.5000,2.1000,-0.00400,0"
         );
     }
 }

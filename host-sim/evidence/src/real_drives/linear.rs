@@ -26,16 +26,23 @@ fn regressors(log: &DriveLog, k: usize) -> Option<([f64; REGRESSORS], f64)> {
     (y + x.iter().sum::<f64>()).is_finite().then_some((x, y))
 }
 
+/// The weights of least squares; none of too few rows.
+pub(super) fn weights<X: AsRef<[f64]>>(rows: &[(X, f64)]) -> Option<Vec<f64>> {
+    let regressors = rows.first()?.0.as_ref().len();
+    let x = DMatrix::from_fn(rows.len(), regressors, |k, i| rows[k].0.as_ref()[i]);
+    let y = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.1));
+    Some(x.svd(true, true).solve(&y, 1e-10).ok()?.as_slice().into())
+}
+
+pub(super) fn dot(x: &[f64], weights: &[f64]) -> f64 {
+    x.iter().zip(weights).map(|(x, w)| x * w).sum()
+}
+
 /// The variance that a linear regression on some rows accounts for on others.
 pub(super) fn linear(log: &DriveLog, own: &[usize], other: &[usize]) -> Option<f64> {
     let rows = |rows: &[usize]| -> Vec<_> { rows.iter().filter_map(|k| regressors(log, *k)).collect() };
-    let (own, other) = (rows(own), rows(other));
-    let x = DMatrix::from_fn(own.len(), REGRESSORS, |k, i| own[k].0[i]);
-    let y = DVector::from_iterator(own.len(), own.iter().map(|row| row.1));
-    let weights = x.svd(true, true).solve(&y, 1e-10).ok()?;
-    let (measured, predicted): (Vec<f64>, Vec<f64>) = other
-        .iter()
-        .map(|(x, y)| (*y, x.iter().zip(weights.iter()).map(|(x, w)| x * w).sum::<f64>()))
-        .unzip();
+    let weights = weights(&rows(own))?;
+    let predicted = rows(other).into_iter().map(|(x, y)| (y, dot(&x, &weights)));
+    let (measured, predicted): (Vec<f64>, Vec<f64>) = predicted.unzip();
     Some(accounted(&measured, &predicted))
 }

@@ -25,6 +25,11 @@ pub(super) struct Rows {
     pub(super) e_theta_rad: Vec<f64>,
     /// Measured, or, where it is not, of curvature and speed.
     pub(super) yaw_rate_rad_per_s: Vec<f64>,
+    pub(super) driven_1pm: Vec<f64>,
+    /// 0 where it is not recorded: no bank of the road is known then.
+    pub(super) roll_rad: Vec<f64>,
+    /// The curvature that is planned, 1/m, and the lane's offset, m; none without them.
+    pub(super) road: Option<[Vec<f64>; 2]>,
 }
 
 impl Rows {
@@ -54,6 +59,7 @@ impl Rows {
         let yaw_rate_rad_per_s: Vec<f64> = (0..time_s.len()).map(rate).collect();
         let [near, far] = POINTS_S.map(|ahead_s| turned(&time_s, &yaw_rate_rad_per_s, ahead_s));
         let lateral = |(near, v): (f64, &f64)| 0.5 * POINTS_S[0] * v * near;
+        let level = vec![0.0; time_s.len()];
         Some(Self {
             e_y_m: near.into_iter().zip(&speed_m_per_s).map(lateral).collect(),
             e_theta_rad: far,
@@ -64,6 +70,11 @@ impl Rows {
             speed_m_per_s,
             guidance_nm,
             yaw_rate_rad_per_s,
+            driven_1pm,
+            roll_rad: column("roll_angle_rad").unwrap_or(level),
+            road: column("curvature_1pm")
+                .zip(column("offset_m"))
+                .map(<[_; 2]>::from),
         })
     }
 

@@ -4,6 +4,7 @@ use haptic_analysis::identify::Layout;
 
 use super::fed::{Feed, fed};
 use super::hands::{Felt, Hands, area};
+use super::pooled::{Judged, Model, Pooled, Segment, pooled};
 use super::rows::{Rows, turned};
 
 /// 100 s shared and 60 s by hand, of simulated drives with the paper's vehicle.
@@ -27,6 +28,9 @@ fn made(by_hand_nm: &[f64], shared_nm: &[f64]) -> Rows {
         e_y_m: vec![0.0; n],
         e_theta_rad: vec![0.0; n],
         yaw_rate_rad_per_s: vec![0.0; n],
+        driven_1pm: vec![0.0; n],
+        roll_rad: vec![0.0; n],
+        road: None,
     }
 }
 
@@ -145,4 +149,81 @@ fn an_honest_recording_ends_nothing_and_what_is_wrong_in_it_is_named() {
         ends(&free, Feed::Line),
         [of("HandsOff", true), of("HandsOff", true)]
     );
+}
+
+/// Six segments of 60 s by hand on bends of their own, with an offset of the torque each; `torque` has wheel angle, planned curvature
+/// times v^2 and row.
+fn segments(torque: impl Fn(f64, f64, usize) -> f64) -> Vec<(String, Segment)> {
+    let of = |segment: usize| {
+        let mut rows = made(&[0.0; 481], &[]);
+        let turn = |k: usize| (0.05 * k as f64 + segment as f64).sin();
+        let planned = |k: usize| 0.002 * turn(k) + 0.001 * (0.023 * (k * (segment + 2)) as f64).cos();
+        let offset = |k: usize| 0.2 * (0.031 * (k + 40 * segment) as f64).sin();
+        rows.wheel_rad = (0..481).map(|k| 0.1 * turn(k)).collect();
+        rows.road = Some([(0..481).map(planned).collect(), (0..481).map(offset).collect()]);
+        let told = |k: usize| torque(rows.wheel_rad[k], 400.0 * planned(k), k) + segment as f64;
+        rows.driver_nm = (0..481).map(told).collect();
+        let [segment] = <[Segment; 1]>::try_from(Segment::of(&rows, "drive.csv"))
+            .ok()
+            .unwrap();
+        ("truck".to_owned(), segment)
+    };
+    (0..6).map(of).collect()
+}
+
+/// The variance that a model accounts for in each of them.
+fn accounted(found: &Pooled, model: Model, ahead_s: Option<f64>) -> [f64; 6] {
+    let is_it = |judged: &&Judged| judged.model == model && judged.ahead_s == ahead_s;
+    let judged = found.models.iter().find(is_it).unwrap();
+    judged.accounted[..].try_into().unwrap()
+}
+
+fn one(mut found: Vec<Pooled>) -> Pooled {
+    assert_eq!(found.len(), 1);
+    found.remove(0)
+}
+
+#[test]
+fn what_all_segments_share_is_told_in_the_one_left_out() {
+    // A spring at the wheel; a driver who follows the planned curvature; both.
+    let [spring, driver] = [
+        |phi: f64, _: f64, _| 5.0 * phi,
+        |_: f64, road: f64, _| -0.6 * road,
+    ];
+    let column = one(pooled(segments(spring)));
+    assert!(accounted(&column, Model::Column, None).iter().all(|v| *v > 0.999));
+    let alone = one(pooled(segments(driver)));
+    assert!(accounted(&alone, Model::Driver, None).iter().all(|v| *v > 0.999));
+    let both = one(pooled(segments(|phi, road, k| {
+        spring(phi, 0.0, k) + driver(0.0, road, k)
+    })));
+    let then = accounted(&both, Model::ColumnThenDriver, None);
+    for (column, then) in accounted(&both, Model::Column, None).into_iter().zip(then) {
+        assert!(column < 0.98 && then > column, "{column} {then}");
+    }
+    // Persistence of a wave of 0.05 rad in 1/8 s, 1 s ahead: 1 - var(y(t+8) - y(t))/var(y) = 1 - 2 (1 - cos 0.4) but for the ends.
+    for stays in accounted(&column, Model::Persistence, Some(1.0)) {
+        assert!(
+            (stays - (1.0 - 2.0 * (1.0 - 0.4_f64.cos()))).abs() < 0.03,
+            "{stays}"
+        );
+    }
+    for model in [Model::OwnPast, Model::Road, Model::BoxJenkins, Model::Ceiling] {
+        let ahead = accounted(&column, model, Some(1.0));
+        assert!(ahead.iter().all(|v| *v > 0.999), "{model:?} {ahead:?}");
+    }
+}
+
+#[test]
+fn noise_is_predicted_by_nothing_and_five_segments_are_too_few() {
+    // Squares modulo a prime.
+    let noise = |_: f64, _: f64, k: usize| ((k * k * 7919 + k * 104_729) % 1009) as f64 / 1009.0;
+    let found = one(pooled(segments(noise)));
+    for model in [Model::OwnPast, Model::Road, Model::BoxJenkins] {
+        let ahead = accounted(&found, model, Some(0.5));
+        assert!(ahead.iter().all(|v| *v < 0.1), "{model:?} {ahead:?}");
+    }
+    let mut few = segments(noise);
+    few.truncate(5);
+    assert!(pooled(few).is_empty());
 }

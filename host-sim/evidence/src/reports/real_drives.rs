@@ -1,6 +1,7 @@
 //! Recordings of real people: what was read and refused, and who predicts the driver's torque best.
 
 mod hands;
+mod pooled;
 
 use haptic_evidence::real_drives::{Found, Half, RealDrive, RealDrives, Source};
 use haptic_report::document::{Block, Cell, Report, Section, Table};
@@ -22,6 +23,10 @@ pub(crate) fn report(found: &RealDrives) -> Report {
     ];
     let sections = [
         ("Summary", summary(found)),
+        (
+            "The segments of a vehicle together",
+            pooled::section(&found.pooled),
+        ),
         ("Hands and override", hands.unwrap_or_default()),
         ("Drives", each),
         ("Sources", vec![Block::Table(sources(found))]),
@@ -46,8 +51,8 @@ fn files(found: &RealDrives, of: impl Fn(&RealDrive) -> bool) -> usize {
     names.len()
 }
 
-fn part(drive: &RealDrive) -> &'static str {
-    if drive.by_hand { "by hand" } else { "shared" }
+fn driving(by_hand: bool) -> &'static str {
+    if by_hand { "by hand" } else { "shared" }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -58,12 +63,12 @@ fn median(mut values: Vec<f64>) -> f64 {
     0.5 * (middle(n / 2) + middle(n.saturating_sub(1) / 2))
 }
 
-/// The 95 % interval of a median, by its ranks: the sign test's. Both halves of a drive count once, for they are no independent
+/// The 95 % interval of a median, by its ranks: the sign test's. The values of a drive count once, for they are no independent
 /// draws. None of fewer than six drives.
-fn interval(mut values: Vec<f64>) -> Option<[f64; 2]> {
+fn interval(mut values: Vec<f64>, of_a_drive: usize) -> Option<[f64; 2]> {
     values.retain(|v| v.is_finite());
     values.sort_by(f64::total_cmp);
-    let drives = values.len() / 2;
+    let drives = values.len() / of_a_drive;
     // The chance that fewer than `rank` of the drives lie below the median.
     let (mut below, mut chance, mut rank) = (0.0, 0.5_f64.powi(drives as i32), 0);
     while below + chance <= 0.025 && rank < drives {
@@ -71,17 +76,17 @@ fn interval(mut values: Vec<f64>) -> Option<[f64; 2]> {
         chance *= (drives - rank) as f64 / (rank + 1) as f64;
         rank += 1;
     }
-    let first = 2 * rank.checked_sub(1)?;
+    let first = of_a_drive * rank.checked_sub(1)?;
     Some([values[first], values[values.len() - 1 - first]])
 }
 
-fn with_interval(values: Vec<f64>) -> Cell {
+fn with_interval(values: Vec<f64>, of_a_drive: usize) -> Cell {
     // A prediction that is ten times as far off as none is nonsense; its size says nothing more.
     let text = |v: f64| match v < -10.0 {
         true => "below -10".into(),
         false => format!("{v:.2}"),
     };
-    let within = interval(values.clone());
+    let within = interval(values.clone(), of_a_drive);
     let within = within.map(|[low, high]| format!(" ({} to {})", text(low), text(high)));
     let median = median(values);
     if median.is_nan() {
@@ -100,7 +105,7 @@ fn summary(found: &RealDrives) -> Vec<Block> {
     };
     let row = |(name, by_hand, accepted)| {
         let halves = half(by_hand, accepted);
-        let of = |value: fn(&Half) -> f64| with_interval(halves.iter().map(value).collect());
+        let of = |value: fn(&Half) -> f64| with_interval(halves.iter().map(value).collect(), 2);
         let wins = halves.iter().filter(|h| h.ours > h.linear).count();
         [
             ("Halves", Cell::text(name)),
@@ -174,7 +179,7 @@ fn predictions(found: &RealDrives) -> Figure {
             sorted("linear", 3, |h| h.linear),
         ];
         let y = Axis::new("variance accounted for", "-").within(-1.05, 1.0);
-        Panel::new(if by_hand { "by hand" } else { "shared" }, y, series)
+        Panel::new(driving(by_hand), y, series)
     };
     Figure {
         same_y: true,
@@ -189,7 +194,7 @@ fn drives(found: &RealDrives) -> Table {
         let vaf = |half: usize, value: fn(&Half) -> f64| Cell::number(f.halves.get(half).map(value), 2);
         [
             ("Recording", Cell::text(&drive.file)),
-            ("Driving", Cell::text(part(drive))),
+            ("Driving", Cell::text(driving(drive.by_hand))),
             ("Used, s", Cell::number(f.used_s, 1)),
             ("1: own", vaf(0, |h| h.own)),
             ("other", vaf(0, |h| h.ours)),
@@ -215,7 +220,7 @@ fn drives(found: &RealDrives) -> Table {
 
 fn refused(found: &RealDrives) -> Table {
     let row = |drive: &RealDrive| {
-        let cells = [&drive.file, part(drive), drive.refused.as_ref()?].map(Cell::text);
+        let cells = [&drive.file, driving(drive.by_hand), drive.refused.as_ref()?].map(Cell::text);
         Some(["Recording", "Driving", "Cause"].into_iter().zip(cells))
     };
     Table::of_rows("Refused.", found.drives.iter().filter_map(row))
@@ -266,8 +271,8 @@ mod tests {
     #[test]
     fn the_interval_of_a_median_has_the_ranks_of_the_sign_test() {
         let drives = |n: u32| (0..n).flat_map(|k| [f64::from(k); 2]).collect::<Vec<_>>();
-        assert_eq!(interval(drives(20)), Some([5.0, 14.0]));
-        assert_eq!(interval(drives(6)), Some([0.0, 5.0]));
-        assert_eq!(interval(drives(5)), None);
+        assert_eq!(interval(drives(20), 2), Some([5.0, 14.0]));
+        assert_eq!(interval(drives(6), 2), Some([0.0, 5.0]));
+        assert_eq!(interval(drives(5), 2), None);
     }
 }

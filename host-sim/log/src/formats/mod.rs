@@ -41,7 +41,7 @@ pub use bus_log::{BusLog, Watch, write_frames};
 use write::replaced;
 pub use write::{to_csv, write};
 
-use crate::notes::Notes;
+use crate::notes::{Fate, Notes};
 use crate::recording::{Group, Lines, Recording, RecordingError, Series, Term, refuse};
 use crate::units;
 
@@ -278,6 +278,7 @@ fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, Recordi
         channel: "time_s".into(),
         factor: None,
     };
+    let is_usual = time.is_none();
     let time = time.unwrap_or(&usual);
     let wanted = time.channel.as_str();
     let columns = &mut table.columns;
@@ -286,10 +287,6 @@ fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, Recordi
         let is_it = |c: &Series| units::bare(&c.name).eq_ignore_ascii_case(units::bare(wanted));
         columns.iter().position(is_it)
     });
-    let is_twice = |place: usize| columns[place + 1..].iter().any(|c| c.name == columns[place].name);
-    if place.is_some_and(is_twice) {
-        return Err(format!("channel {wanted} is there twice").into());
-    }
     let Some(place) = place else {
         let bare = units::bare(wanted);
         if let Some(error) = table.notes.left_out(bare) {
@@ -309,6 +306,16 @@ fn with_time(mut table: Table, time: Option<&Term>) -> Result<Recording, Recordi
         .into());
     };
     let mut own = columns.remove(place);
+    let before = columns.len();
+    columns.retain(|c| c.name != own.name);
+    // OpenLKA's tables have the time of the drive and, behind all others, that of the segment by one name.
+    match before - columns.len() {
+        0 => {}
+        _ if is_usual => return Err(format!("channel {wanted} is there twice").into()),
+        _ => table
+            .notes
+            .channel(Fate::LeftOut, &own.name, "the first of this name is the time"),
+    }
     if own.unit.is_empty() {
         let said = units::in_brackets(&own.name).map(|(_, unit)| unit);
         own.unit = said

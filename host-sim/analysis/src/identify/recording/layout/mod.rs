@@ -51,6 +51,8 @@ pub struct Layout {
     pub licence: String,
     /// The commit of the source that it was tried on; none: untested.
     pub tried_on: Option<String>,
+    /// How many folders up from a recording the one is that is named after its vehicle; none: the one that it lies in.
+    pub vehicle_folder: Option<usize>,
     /// What a reader of the estimates has to know.
     note: Option<String>,
     /// What the recordings lack, so that nobody can be identified from them.
