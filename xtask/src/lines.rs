@@ -19,7 +19,7 @@ pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("core/diag", 1_400),
     ("core/secoc", 820),
     ("examples", 200),
-    ("firmware", 3_020),
+    ("firmware", 3_145),
     ("firmware/lockstep", 200),
     ("host-sim", 3_340),
     ("host-sim/analysis", 9_150),
