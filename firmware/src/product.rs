@@ -173,11 +173,8 @@ fn receive(
 }
 
 /// Hands on what may command.
-fn hear((frame, at): Passed, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
-    if let Err(reason) = ecu.receive(&frame, at) {
-        counts.rejected.count(frame.id(), reason);
-    }
-    if let Some(set) = service.receive(&frame, ecu, counts.steps) {
+fn hear(passed: Passed, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
+    if let Some(set) = service.receive(passed, ecu, &mut counts.rejected, counts.steps) {
         ThisBoard::zero_torque();
         reset::restart_with(&set);
     }
