@@ -6,6 +6,7 @@ core/secoc/authentication.dbc describes the messages. Needs the package `cryptog
 
 import pathlib
 import secrets
+import tomllib
 
 import can
 import cantools
@@ -25,6 +26,15 @@ def tag(key, purpose, identifier, epoch, number, payload=b""):
     numbers = ((purpose, 1), (identifier, 2), (epoch, 4), (number, 4))
     mac.update(b"".join(value.to_bytes(size, "big") for value, size in numbers) + payload)
     return int.from_bytes(mac.finalize()[:4], "big") >> 4
+
+
+def keys_of(path):
+    """Camera's and host's keys of a keys.toml."""
+    with open(path, "rb") as file:
+        kept = tomllib.load(file)
+    if kept["mac"] != "aes-cmac":
+        raise SystemExit(f"{path}: mac = {kept['mac']!r}; this program has AES-CMAC alone")
+    return {name: bytes.fromhex(kept[name]) for name in ("camera", "host")}
 
 
 def message(identifier, data):

@@ -18,6 +18,7 @@ import cantools
 from lockstep_client import LockStep
 
 DBC = pathlib.Path(__file__).parent.parent / "core" / "haptic.dbc"
+AUTHENTICATION = pathlib.Path(__file__).parent.parent / "core" / "secoc" / "authentication.dbc"
 SPEED = 20.0  # m/s
 PERIOD_MS = {"LanePreview": 8, "Column": 2, "Vehicle": 10, "Request": 10}
 
@@ -142,10 +143,10 @@ class InLockStep(LockStep):
 
 
 class Run:
-    def __init__(self, clock, database, prover=None):
+    def __init__(self, clock, database, status, proofs):
         self.clock, self.vehicle, self.ecu, self.ms = clock, Vehicle(database), Ecu(database), 0
         self.latest, self.reported = 0.0, None
-        self.prover, self.questions = prover, []
+        self.status, self.proofs, self.prover, self.questions = status, proofs, None, []
 
     def step(self):
         """One millisecond."""
@@ -155,7 +156,10 @@ class Run:
         for frame in self.clock.tick(self.ms, frames):
             if self.ecu.hear(frame):
                 self.vehicle.torque = self.ecu.torque
-            elif self.prover:
+                continue
+            if self.prover is None and frame.arbitration_id == self.status.frame_id:
+                self.authenticate(str(self.status.decode(bytes(frame.data))["Authentication_State"]))
+            if self.prover:
                 self.questions += self.prover.hear(frame)
         self.ms += 1
         self.latest = max(self.latest, self.clock.late_ms(self.ms))
@@ -164,8 +168,19 @@ class Run:
             faults = f", {', '.join(self.ecu.faults)}" if self.ecu.faults else ""
             print(f"{self.ms / 1000:7.3f} s  {self.ecu.mode}  {self.ecu.torque:+.3f} N.m{faults}", flush=True)
 
+    def authenticate(self, state):
+        """Proves the frames from here on, if the ECU has keys."""
+        if state == "AesCmac" and self.proofs:
+            self.prover = self.proofs
+        elif state == "AesCmac":
+            self.fail("the ECU has keys, and the package cryptography is missing")
+        elif state != "Bench":
+            self.fail(f"the ECU says {state}: without keys it never engages, and this program proves by AES-CMAC alone")
+
     def synchronise(self):
-        """Until the ECU can verify what is sent."""
+        """Until the ECU can verify what is sent: every 100 ms it says how, if it has something to verify with."""
+        for _ in range(150):
+            self.step()
         while self.prover and not self.prover.is_synchronised():
             self.step()
             if self.ms == 5000:
@@ -195,20 +210,27 @@ def main():
     parser.add_argument("--lockstep", action="store_true", help="the image is lockstep: time is the ECU's own")
     parser.add_argument("--seconds", type=float, default=60, help="how long to stay engaged (default: 60)")
     parser.add_argument("--dbc", default=DBC, help="the description of the bus (default: core/haptic.dbc)")
-    parser.add_argument("--authenticate", action="store_true", help="prove the frames, as `ecu run --authenticate aes-cmac` wants it")
+    parser.add_argument("--keys", type=pathlib.Path, help="keys.toml of `cargo xtask keys`, for an ECU with keys (default: those of the bench)")
     arguments = parser.parse_args()
 
     database = cantools.database.load_file(arguments.dbc)
+    status = cantools.database.load_file(AUTHENTICATION).get_message_by_name("Authentication")
+    proofs = prepared(database, arguments.keys)
     clock = (InLockStep if arguments.lockstep else OnTheWall)(arguments.channel)
-    prover = None
-    if arguments.authenticate:
-        from authentication import Prover
-
-        prover = Prover(lambda data: protected_crc(database.get_message_by_name("Request"), data))
     with clock.bus:
-        run = Run(clock, database, prover)
+        run = Run(clock, database, status, proofs)
         run.synchronise()
         drive(run, arguments.seconds)
+
+
+def prepared(database, keys):
+    """Proofs for an ECU with keys; None without the package that makes them."""
+    try:
+        from authentication import Prover, keys_of
+    except ImportError:
+        return None
+    request = database.get_message_by_name("Request")
+    return Prover(lambda data: protected_crc(request, data), **(keys_of(keys) if keys else {}))
 
 
 def drive(run, seconds):

@@ -321,3 +321,29 @@ fn reading_the_reliance_costs_less_than_400_instructions_a_step() {
     // 151 are those of a telemetry frame alone: more shows that there was a probe to read.
     assert!((200..400).contains(&worst), "{worst}");
 }
+
+/// The stack's budget (`firmware/src/stack.x`).
+const STACK: u32 = 16_384;
+
+/// A workshop's questions, as many as the bus carries: whatever else the ECU says is the same to the bit, the step is within its budget,
+/// and what comes of a question adds to it what taking three frames does.
+#[test]
+fn a_flood_of_questions_leaves_the_step_within_its_budget_and_the_torque_as_it_is() {
+    let flood = host_sim::tester::flood().unwrap();
+    println!("{flood:?}");
+    let [quiet, flooded] = &flood.costs;
+    assert!(flood.answers > 1000, "{} frames of answers", flood.answers);
+    assert!(flood.added <= 300, "{} instructions", flood.added);
+    assert!(
+        quiet.worst <= flooded.worst && flooded.worst <= 5500,
+        "{}",
+        flooded.worst
+    );
+    assert!(
+        flooded.worst_behind > quiet.worst_behind,
+        "answers are worked out"
+    );
+    for cost in &flood.costs {
+        assert!(cost.stack_bytes > 0 && cost.stack_bytes < STACK, "{cost:?}");
+    }
+}

@@ -84,7 +84,7 @@ fn read(stored: &[u8; 64]) -> Option<Keys> {
 }
 
 /// The first byte of the page that many from the end.
-fn page<F: NorFlash>(flash: &F, from_end: u32) -> Option<u32> {
+pub(crate) fn page<F: NorFlash>(flash: &F, from_end: u32) -> Option<u32> {
     (flash.capacity() as u32).checked_sub(from_end * F::ERASE_SIZE as u32)
 }
 
@@ -142,7 +142,7 @@ fn scan<F: NorFlash>(flash: &mut F, begin: u32) -> Option<Page> {
 }
 
 /// The number, its complement, and both again.
-fn entry(number: u32) -> [u8; ENTRY] {
+pub(crate) fn entry(number: u32) -> [u8; ENTRY] {
     let [a, b, c, d] = number.to_le_bytes();
     let [e, f, g, h] = (!number).to_le_bytes();
     [a, b, c, d, e, f, g, h, a, b, c, d, e, f, g, h]

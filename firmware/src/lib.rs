@@ -8,7 +8,7 @@
 //! - [`image`]: whether the image in the flash is the one that was built.
 //! - [`eccr`]: where in the STM32G4's flash an error lies.
 //! - [`analogue`]: a motor stage and the column's sensors, in counts of converters.
-//! - [`storage`]: parameters in flash, [`keys`]: keys and starts, [`nor`]: a model of a flash.
+//! - [`storage`]: parameters in flash, [`codes`]: codes of faults, [`keys`]: keys and starts, [`nor`]: a model of a flash.
 //! - `host`: words from the machine that runs QEMU.
 //!
 //! Images (`src/bin`): `steering-ecu`, the product; `lockstep`, the same controller driven tick by tick by a
@@ -22,6 +22,7 @@
 #![cfg_attr(target_os = "none", no_std)]
 
 pub mod analogue;
+pub mod codes;
 #[cfg(any(feature = "nucleo-g474re", not(target_os = "none")))]
 pub mod eccr;
 pub mod image;

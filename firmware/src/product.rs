@@ -7,8 +7,10 @@
 //!
 //! Its parameters are the newest good set of the flash. Without any, both copies blank or damaged, it locks and waits
 //! for a set over the bus; an image for the bench (feature `bench`) takes the paper's on a blank flash. A set that comes
-//! over the bus is stored at the restart that it causes: the flash is never touched while the loop runs, since an erase
+//! over the bus is stored at the restart that it causes: the flash is not erased while the loop runs, since that
 //! takes longer than the watchdog waits. At every start a copy that cannot be read is written anew.
+//!
+//! Codes of faults are stored at every start, and while the bus is silent, as it is when the ignition is off ([`crate::codes`]).
 //!
 //! What commands it has to be proven ([`haptic_secoc`]); without keys it never engages, unless it is an image for the bench.
 //!
@@ -24,12 +26,14 @@ use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use haptic_core::service::rejections::Rejections;
 use haptic_diag::trouble::Cells;
 use haptic_secoc::messages::State;
 use haptic_secoc::verifier::{Credentials, Passed, Verifier};
 
 use crate::boards::{Board, ThisBoard};
+use crate::codes::Codes;
 use crate::service::{Origin, Restart, Service};
 use crate::storage::{self, Found};
 use crate::{analogue, image, keys, reset, stack};
@@ -38,11 +42,17 @@ use crate::{analogue, image, keys, reset, stack};
 const STEPS_PER_REPORT: u32 = 1000;
 /// Frames taken at once: at 500 kbit/s the shortest takes 94 us, so that eleven come in a tick.
 const MOST_FRAMES: u32 = 32;
+/// A bus on which nobody said anything for so many steps is silent: 5 s. No sender's time-out is longer, nor a tester's.
+const STEPS_OF_SILENCE: u32 = 5000;
+/// Steps between two codes that are stored: programming one may delay a step by less than a millisecond.
+const STEPS_PER_CODE: u32 = 10;
 
 /// What the log says once a second.
 #[derive(Default)]
 struct Counts {
     steps: u32,
+    /// Since a frame came.
+    silent_steps: u32,
     received: u32,
     rejected: Rejections,
     /// What the bus controller reported in place of a frame.
@@ -78,6 +88,7 @@ pub fn run(
     let setup = params.and_then(|params| Setup::new(&params).ok());
     let ecu = begin(ecu, setup.as_ref(), boot);
     let cells = reset::cells();
+    let mut codes = is_sound.then(|| stored_codes(&mut board, cells)).flatten();
     let origin = Origin {
         boot,
         is_image_whole: image == image::State::Whole,
@@ -115,7 +126,8 @@ pub fn run(
         receive(&mut board, ecu, service, verifier, &mut counts);
         if board.tick() {
             disturb(ecu, boot, counts.steps);
-            step(&mut board, ecu, service, verifier, cells, &mut counts);
+            let mode = step(&mut board, ecu, service, verifier, cells, &mut counts);
+            keep_codes(&mut board, codes.as_mut(), cells, mode, &mut counts);
         }
         // Behind the step, which no MAC delays.
         let start = ThisBoard::cycles();
@@ -146,6 +158,7 @@ fn receive(
             }
         };
         counts.received = counts.received.wrapping_add(1);
+        counts.silent_steps = 0;
         // Two senders under one counter would pass each other's frames off.
         if ThisBoard::HAS_COLUMN && frame.id() == Column::ID {
             continue;
@@ -160,11 +173,8 @@ fn receive(
 }
 
 /// Hands on what may command.
-fn hear((frame, at): Passed, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
-    if let Err(reason) = ecu.receive(&frame, at) {
-        counts.rejected.count(frame.id(), reason);
-    }
-    if let Some(set) = service.receive(&frame, ecu, counts.steps) {
+fn hear(passed: Passed, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
+    if let Some(set) = service.receive(passed, ecu, &mut counts.rejected, counts.steps) {
         ThisBoard::zero_torque();
         reset::restart_with(&set);
     }
@@ -185,6 +195,31 @@ fn parameters(board: &mut ThisBoard) -> Found {
         defmt::error!("a copy of the parameters could not be repaired");
     }
     storage::load(board.flash(), hardware)
+}
+
+/// Reads the codes that were stored, and stores those that came between the last time and a reset.
+fn stored_codes(board: &mut ThisBoard, cells: &mut Cells) -> Option<Codes> {
+    let mut codes = Codes::begin(board.flash(), cells)?;
+    while codes.keep(board.flash(), cells) {}
+    Some(codes)
+}
+
+/// Stores a code where the bus is silent and nothing waits for a step.
+fn keep_codes(
+    board: &mut ThisBoard,
+    codes: Option<&mut Codes>,
+    cells: &Cells,
+    mode: Mode,
+    counts: &mut Counts,
+) {
+    counts.silent_steps = counts.silent_steps.saturating_add(1);
+    let is_time = counts.silent_steps >= STEPS_OF_SILENCE && counts.steps.is_multiple_of(STEPS_PER_CODE);
+    if is_time
+        && !mode.may_have_torque()
+        && let Some(codes) = codes
+    {
+        codes.keep(board.flash(), cells);
+    }
 }
 
 /// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
@@ -270,7 +305,7 @@ fn step(
     verifier: &mut Verifier,
     cells: &mut Cells,
     counts: &mut Counts,
-) {
+) -> Mode {
     let step = control(board, ecu, counts);
     // A frame that finds no room is lost; the next follows in a millisecond, and the receiver's time-out
     // judges a bus that stays closed.
@@ -310,6 +345,7 @@ fn step(
             stack::budget()
         );
     }
+    step.command.mode
 }
 
 /// Answers a tester: one request and one frame in a step.

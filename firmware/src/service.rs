@@ -5,7 +5,7 @@
 use core::num::NonZeroU32;
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Identity, Message, Rejection};
+use haptic_core::bus::messages::{Identity, Message, ParameterUnlock, ParameterWrite, Rejection};
 use haptic_core::controller::Command;
 use haptic_core::controller::params::Params;
 use haptic_core::ecu::{Boot, Ecu};
@@ -13,9 +13,11 @@ use haptic_core::safety::modes::Mode;
 use haptic_core::service::download::{self, Conditions, Download, mode_for_parameters};
 use haptic_core::service::rejections::Rejections;
 use haptic_core::service::stored::Set;
+use haptic_diag::REQUEST_ID;
 use haptic_diag::security::Key;
 use haptic_diag::server::{Server, Situation, Wish};
 use haptic_diag::trouble::Cells;
+use haptic_secoc::verifier::Passed;
 use heapless::Vec;
 
 use crate::boards::{Board, ThisBoard};
@@ -94,10 +96,29 @@ impl Service {
         &self.found
     }
 
-    /// Takes a frame in the step of that number; the set that it completes.
-    pub fn receive(&mut self, frame: &Frame, ecu: &Ecu, steps: u32) -> Option<Set> {
-        self.server.receive(frame, steps);
-        self.download.receive(frame, &self.conditions(ecu, steps))
+    /// Hands a frame, and when it came, to the controller, the tester's server and the download in the step of that number; the set
+    /// that it completes.
+    pub fn receive(
+        &mut self,
+        (frame, at): Passed,
+        ecu: &mut Ecu,
+        rejected: &mut Rejections,
+        steps: u32,
+    ) -> Option<Set> {
+        self.server.receive(&frame, steps);
+        match frame.id() {
+            // It is none of the controller's.
+            REQUEST_ID => return None,
+            id => {
+                if let Err(reason) = ecu.receive(&frame, at) {
+                    rejected.count(id, reason);
+                }
+            }
+        }
+        // What a set finds is looked up for its own frames alone.
+        let is_of_a_set = matches!(frame.id(), ParameterUnlock::ID | ParameterWrite::ID);
+        let conditions = is_of_a_set.then(|| self.conditions(ecu, steps))?;
+        self.download.receive(&frame, &conditions)
     }
 
     fn conditions(&self, ecu: &Ecu, steps: u32) -> Conditions {

@@ -33,6 +33,7 @@
 
 pub mod cli;
 pub mod processor;
+pub mod tester;
 
 /// The examples of the documents, as doctests.
 #[cfg(doctest)]

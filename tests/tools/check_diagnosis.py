@@ -2,14 +2,17 @@
 
     python tests/tools/check_diagnosis.py target/release/host-sim     # the bus of `host-sim ecu run`
     python tests/tools/check_diagnosis.py IMAGE.elf                   # the product's serial port, on a computer with time for it
+    python tests/tools/check_diagnosis.py --power IMAGE.elf           # the same; the machine is ended, and started again with its flash
 
 A fault is injected, its code is read, found again after a reset, and cleared; a parameter is read, written behind security access, and
-read back after the restart. The ECU does not wait for this program, so what came too late is asked again, a few times.
+read back after the restart. With --power the code is found again after a loss of supply, cleared, and gone after another. The ECU does not
+wait for this program, so what came too late is asked again, a few times.
 """
 
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections import deque
@@ -36,6 +39,7 @@ OWN_IDENTIFIER, DEADLINE = 0x511100, 0x510800  # C1111, C1108
 TORQUE_LIMIT = 0x1000  # and the parameter's place in the list, from the DBC file
 SEQUENCE, COMMIT = 0x0201, 0x0200
 PATIENCE = 60
+SILENCE = 6  # seconds without a frame after which codes are in the flash: five, and one to write them
 SPEED_MS = 20  # nearly the slowest that an ECU takes for one
 PATIENT = {"tx_padding": 0xCC, "rx_consecutive_frame_timeout": 10_000, "rx_flowcontrol_timeout": 10_000}
 
@@ -72,12 +76,15 @@ class Bench:
 
 
 class Machine:
-    """The product in QEMU, its bus on a pseudo-terminal."""
+    """The product in QEMU, its bus on a pseudo-terminal; its flash in a file, if there is one."""
 
-    def __init__(self, elf):
-        arguments = "-machine mps2-an386 -display none -monitor none -serial pty -serial null -icount shift=5,align=on"
+    def __init__(self, elf, flash=None):
+        machine = "mps2-an386,memory-backend=flash" if flash else "mps2-an386"
+        kept = ["-object", f"memory-backend-file,id=flash,size=16M,mem-path={flash},share=on"] if flash else []
+        arguments = "-display none -monitor none -serial pty -serial null -icount shift=5,align=on"
+        program = ["qemu-system-arm", "-machine", machine, *kept, *arguments.split()]
         self.qemu = subprocess.Popen(
-            ["qemu-system-arm", *arguments.split(), "-semihosting-config", "enable=on,target=native", "-kernel", elf],
+            [*program, "-semihosting-config", "enable=on,target=native", "-kernel", elf],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             text=True,
@@ -280,6 +287,29 @@ def parameter(tester, bus, did):
     print(f"torque_limit_nm was {before} N.m and is {after} N.m after the restart")
 
 
+def power(elf):
+    """What is left of a fault when the supply was lost, first with its code stored, then with it cleared."""
+    with tempfile.TemporaryDirectory() as folder:
+        for turn in ("stored", "found again", "gone"):
+            machine = Machine(elf, Path(folder) / "flash")
+            try:
+                with Slcan(machine.port, None) as bus:
+                    tester = Tester(bus, TORQUE_LIMIT)
+                    if turn == "stored":
+                        faults(tester, bus)
+                    status = tester.status(OWN_IDENTIFIER)
+                    assert (status is None) == (turn == "gone"), status
+                    if turn == "found again":
+                        assert status.confirmed and not status.test_failed_this_operation_cycle, status
+                        tester.ask("change_session", 3)
+                        tester.ask("clear_dtc", 0xFFFFFF)
+                    bus.wait(SILENCE)
+                    tester.client.close()
+            finally:
+                machine.end()
+    print("C1111 is there after a loss of supply, and gone after another once it was cleared")
+
+
 def main(program):
     database = cantools.database.load_file(DBC)
     names = database.get_message_by_name("ParameterValue").get_signal_by_name("ParameterValue_Index").choices
@@ -301,4 +331,4 @@ def main(program):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    power(sys.argv[2]) if sys.argv[1] == "--power" else main(sys.argv[1])

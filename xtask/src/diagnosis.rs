@@ -2,7 +2,9 @@
 
 use anyhow::Result;
 
+use crate::boards::Board;
 use crate::built::Built;
+use crate::image::Image;
 use crate::tool::{self, command, run};
 use crate::venv;
 
@@ -15,5 +17,8 @@ pub(crate) fn check(built: Built) -> Result<()> {
             .arg(format!("tests/tools/{check}"))
             .arg(&host_sim))?;
     }
-    Ok(())
+    let product = Board::Mps2An386.build(Image::SteeringEcu)?;
+    run(command(&python.to_string_lossy())
+        .args(["tests/tools/check_diagnosis.py", "--power"])
+        .arg(product))
 }

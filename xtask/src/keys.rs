@@ -304,9 +304,9 @@ mod tests {
         }
     }
 
-    /// The fifth page from the end of the flash, of which an image has all but seven pages.
+    /// The fifth page from the end of the flash, of which an image has all but nine pages.
     #[test]
-    fn the_page_lies_behind_the_image_and_two_pages_of_starts() {
+    fn the_page_lies_behind_the_image_and_the_pages_of_codes_and_starts() {
         for (board, map, page) in [
             (
                 Board::NucleoG474re,
@@ -323,7 +323,7 @@ mod tests {
             let (origin, length) = line.split_once(", LENGTH = ").unwrap();
             let origin = u32::from_str_radix(origin.split("0x").nth(1).unwrap(), 16).unwrap();
             let length: u32 = length.trim_end_matches('K').parse().unwrap();
-            assert_eq!(board.keys_at(), Some(origin + (length + 2 * page) * 1024));
+            assert_eq!(board.keys_at(), Some(origin + (length + 4 * page) * 1024));
         }
         assert_eq!(Board::Mps2An386.keys_at(), None);
     }

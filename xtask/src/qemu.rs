@@ -48,6 +48,10 @@ pub(crate) struct Options {
     /// takes its time from the bus: off.
     #[arg(long, value_name = "paced|SHIFT|off")]
     icount: Option<Clock>,
+    /// Keep the flash of steering-ecu (parameters, codes of faults) in this file, which is made if it is not there; otherwise it is
+    /// blank at the start and gone at the end.
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
     /// Stop after this many seconds, with exit code 124. Default: 60 with `--can null`; else the run lasts until
     /// Ctrl-C.
     #[arg(long, value_name = "SECONDS")]
@@ -172,7 +176,7 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
     let log = TcpListener::bind("127.0.0.1:0").context("a port for the log")?;
     let mut command = Command::new("qemu-system-arm");
     command
-        .args(["-machine", options.board.feature()])
+        .args(machine(options))
         .args(["-display", "none", "-monitor", "none"])
         .args(["-serial", &bus(&options.can)])
         .args(["-serial", &format!("tcp:{}", log.local_addr()?)])
@@ -204,6 +208,18 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
     }
     forward_log(log, events.clone());
     Ok(Machine(child))
+}
+
+/// QEMU's options of the machine, and of its memory that plays the flash (`firmware/src/boards/mps2.rs`), if that is in a file.
+fn machine(options: &Options) -> Vec<String> {
+    let board = options.board.feature();
+    let Some(file) = &options.flash else {
+        return vec!["-machine".into(), board.into()];
+    };
+    let file = file.display().to_string().replace(',', ",,");
+    let memory = format!("memory-backend-file,id=flash,size=16M,mem-path={file},share=on");
+    let machine = format!("{board},memory-backend=flash");
+    vec!["-object".into(), memory, "-machine".into(), machine]
 }
 
 /// QEMU's name of the bus. On TCP without Nagle's algorithm, which holds a frame back until the last one was acknowledged:

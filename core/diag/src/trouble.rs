@@ -2,10 +2,11 @@
 //! snapshot of its last appearance.
 //!
 //! They lie in [`Cells`], memory that a reset leaves alone and that a loss of supply does not: each cell has a CRC-32, and
-//! one that is not whole is an empty one. A status is that of ISO 14229-1, annex D, of which [`AVAILABLE`] are the bits that
+//! one that is not whole says nothing. A status is that of ISO 14229-1, annex D, of which [`AVAILABLE`] are the bits that
 //! are kept. A code is confirmed at once, as the controller has judged the fault before it declares it.
 //!
-//! Not here: what a fault leads to. Clearing a code ends no fault.
+//! Not here: what a fault leads to, as clearing a code ends no fault; and the flash that keeps cells through a loss of supply
+//! (`haptic-firmware`).
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use haptic_core::controller::Command;
@@ -17,11 +18,13 @@ use crate::data::Heard;
 /// Words of a cell; the last is its CRC.
 const WORDS: usize = 9;
 /// A code, and beside them what security access remembers.
-type Cell = [u32; WORDS];
+pub type Cell = [u32; WORDS];
+/// How many cells there are.
+pub const CELLS: usize = Fault::COUNT + 1;
 /// Memory that a reset leaves alone. Any pattern of bits is allowed.
-pub type Cells = [Cell; Fault::COUNT + 1];
-/// Empty cells.
-pub const EMPTY: Cells = [[0; WORDS]; Fault::COUNT + 1];
+pub type Cells = [Cell; CELLS];
+/// Cells that say nothing.
+pub const EMPTY: Cells = [[0; WORDS]; CELLS];
 
 /// Counts up with every change of what a cell holds: one of another layout is an empty one.
 const LAYOUT: u32 = 1;
@@ -159,9 +162,8 @@ impl Troubles {
         ] {
             set.set(false, fault);
         }
-        if let Some(cell) = cells.get_mut(place(fault)) {
-            *cell = [0; WORDS];
-        }
+        // Whole, so that what the flash holds of it counts no more.
+        seal(cells, place(fault), [0; WORDS - 1]);
     }
 }
 
@@ -180,6 +182,7 @@ const fn place(fault: Fault) -> usize {
 pub fn record(cells: &Cells, fault: Fault) -> Option<Record> {
     let [head, at_ms, faults, torque, driver, wheel, speed, lateral] = read(cells, place(fault))?;
     let [count, mode, ..] = head.to_le_bytes();
+    (count > 0).then_some(())?;
     Some(Record {
         count,
         snapshot: Snapshot {
@@ -232,10 +235,17 @@ pub fn keep_attempts(cells: &mut Cells, attempts: Attempts) {
     seal(cells, Fault::COUNT, [challenges, wrong, 0, 0, 0, 0, 0, 0]);
 }
 
+/// The CRC of a cell in its place, if it is whole.
+#[must_use]
+pub fn mark([words @ .., crc]: &Cell, place: usize) -> Option<u32> {
+    (*crc == checksum(words, place)).then_some(*crc)
+}
+
 /// The words of a cell that is whole.
 fn read(cells: &Cells, place: usize) -> Option<[u32; WORDS - 1]> {
-    let [words @ .., crc] = cells.get(place)?;
-    (*crc == checksum(words, place)).then_some(*words)
+    let cell = cells.get(place)?;
+    let [words @ .., _] = cell;
+    mark(cell, place).map(|_| *words)
 }
 
 fn seal(cells: &mut Cells, place: usize, words: [u32; WORDS - 1]) {

@@ -318,6 +318,12 @@ impl<const BITS: u32, const TAG: u32> Receiver<BITS, TAG> {
         self.used.is_none()
     }
 
+    /// Epochs that are left, the offered one included.
+    #[must_use]
+    pub const fn left(&self) -> u32 {
+        self.left
+    }
+
     /// Answers a sender's question; None when the start's epochs are used up.
     #[must_use]
     pub fn offer(&self, mac: &impl Mac, question: u32) -> Option<Offer> {

@@ -8,6 +8,10 @@
 //! that no flood of false proofs costs the step a MAC. Five frames are verified from one step to the next, a MAC each for the
 //! epoch in use and the one that is offered. More never come: a frame of eight bytes takes a bus of 500 kbit/s 222 us. So a true frame waits
 //! a millisecond at most, whatever else is on the bus.
+//!
+//! Epochs are not used up by whoever has frames refused. A sender whose frames pass has not lost count, and is not told to ask; one that
+//! was kept from the bus on purpose is given 16 epochs at once, then one in 10 s. So the 4,096 of a start last for eleven hours, and a
+//! true sender that asks is answered within 10 s in the worst case.
 
 use haptic_core::bus::Frame;
 use haptic_core::quantity::{Instant, Micros};
@@ -31,6 +35,12 @@ const STEPS_PER_STATUS: u32 = 100;
 const STATUS_AT: u32 = 60;
 const STEPS_PER_OFFER: u32 = 50;
 const OFFER_AT: u32 = 35;
+/// Steps without a frame that passed, after which what is refused may be the true sender's: two periods.
+const LOST_AFTER: u32 = 20;
+/// Epochs of a message that may be used at once, and steps until it is one more.
+const AT_ONCE: u8 = 16;
+const STEPS_PER_EPOCH: u32 = 10_000;
+const EPOCH_AT: u32 = 5;
 const REASONS: usize = Refusal::ALL.len();
 const COUNTS: usize = COUNT.saturating_mul(REASONS);
 /// Starts that have epochs of their own.
@@ -77,8 +87,12 @@ struct Way {
     receiver: ProofReceiver,
     held: Option<Passed>,
     question: Option<u32>,
-    /// Something was refused since the last status: its sender may have lost count.
+    /// Something was refused since the last status.
     is_refused: bool,
+    /// Steps since a frame passed.
+    quiet: u32,
+    /// Epochs that may be used now.
+    at_once: u8,
 }
 
 impl Verifier {
@@ -108,6 +122,8 @@ impl Verifier {
                 held: None,
                 question: None,
                 is_refused: false,
+                quiet: LOST_AFTER,
+                at_once: AT_ONCE,
             }),
             refused: [[0; REASONS]; COUNT],
             waiting: Deque::new(),
@@ -191,6 +207,12 @@ impl Verifier {
     /// What is to be said behind the step of that number; as many frames may be verified again.
     pub fn step(&mut self, steps: u32) -> Option<Frame> {
         self.left = PER_STEP;
+        for way in &mut self.ways {
+            way.quiet = way.quiet.saturating_add(1);
+            if steps % STEPS_PER_EPOCH == EPOCH_AT {
+                way.at_once = way.at_once.saturating_add(1).min(AT_ONCE);
+            }
+        }
         if steps % STEPS_PER_STATUS == STATUS_AT {
             let [counter, ..] = (steps / STEPS_PER_STATUS).to_le_bytes();
             return Some(self.status().encode(counter));
@@ -258,8 +280,15 @@ impl Verifier {
             return false;
         };
         let mac = mac_of(macs, proven.info.sender);
-        let text = proven.text(&passed.0);
-        text.is_some_and(|text| way.receiver.accept(mac, text, proof))
+        let (text, left) = (proven.text(&passed.0), way.receiver.left());
+        let is_true = text.is_some_and(|text| way.receiver.accept(mac, text, proof));
+        if is_true {
+            way.quiet = 0;
+        }
+        if way.receiver.left() < left {
+            way.at_once = way.at_once.saturating_sub(1);
+        }
+        is_true
     }
 
     /// Keeps a question until its offer is due; a later one takes its place, as its sender awaits no other answer.
@@ -281,7 +310,8 @@ impl Verifier {
             self.next_offer = place.wrapping_add(1);
             let (proven, way) = PROVEN.get(place).zip(self.ways.get_mut(place))?;
             let mac = mac_of(macs, proven.info.sender);
-            if let Some(question) = way.question.take()
+            if way.at_once > 0
+                && let Some(question) = way.question.take()
                 && let Some(offer) = way.receiver.offer(mac, question)
             {
                 return Some(frame_of_offer(place, &offer));
@@ -294,7 +324,8 @@ impl Verifier {
         let has_keys = self.macs.is_some();
         let waits = |way: &mut Way| {
             let was_refused = core::mem::take(&mut way.is_refused);
-            has_keys && (was_refused || way.receiver.is_unsynchronised())
+            let is_lost = was_refused && way.quiet >= LOST_AFTER;
+            has_keys && (is_lost || way.receiver.is_unsynchronised())
         };
         Status {
             state: self.state,

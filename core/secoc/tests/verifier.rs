@@ -547,3 +547,90 @@ fn noise_passes_nothing_that_is_not_true_and_stops_nobody() {
         }
     }
 }
+
+/// The ECU and a request's true sender, with somebody who can keep its frames from the bus and has false ones refused in every step.
+struct Besieged {
+    verifier: Verifier,
+    prover: Prover,
+    random: SmallRng,
+    ms: u32,
+    epochs: HashSet<u32>,
+}
+
+impl Besieged {
+    fn new() -> Self {
+        Self {
+            verifier: keyed(Algorithm::SipHash, 1),
+            prover: Prover::new(&Keys::bench(Algorithm::SipHash)),
+            random: SmallRng::seed_from_u64(11),
+            ms: 0,
+            epochs: HashSet::new(),
+        }
+    }
+
+    /// A step: whether the true sender's frame, due in every tenth, passed, and whether a status had it wait.
+    fn step(&mut self, is_kept_away: bool) -> (bool, bool) {
+        self.ms += 1;
+        let (now, mut waits) = (Instant::from_us(self.ms.wrapping_mul(1000)), false);
+        if let Some(frame) = self.verifier.step(self.ms) {
+            waits = Status::decode(&frame).is_some_and(|status| status.waiting[2]);
+            if frame.id() == OFFER {
+                let [.., a, b, c, d] = frame.full_data().unwrap();
+                self.epochs.insert(u32::from_le_bytes([a, b, c, d]));
+            }
+            let random = &mut self.random;
+            for question in self.prover.hear(&frame, || random.random()) {
+                self.verifier.receive(&question, now);
+            }
+        }
+        self.verifier.receive(&numbered(Request::ID, 0), now);
+        if self.ms.is_multiple_of(10) {
+            let [frame] = self.prover.prove(&numbered(Request::ID, self.ms))[..] else {
+                panic!("one frame")
+            };
+            if !is_kept_away {
+                self.verifier.receive(&frame, now);
+            }
+        }
+        let passed = std::iter::from_fn(|| self.verifier.verified()).count();
+        (passed > 0, waits)
+    }
+
+    /// Milliseconds until a true frame passes.
+    fn resume(&mut self) -> u32 {
+        (1..20_000).find(|_| self.step(false).0).expect("a frame passes")
+    }
+}
+
+#[test]
+fn refused_frames_beside_a_true_sender_use_up_no_epoch() {
+    let mut bus = Besieged::new();
+    bus.resume();
+    bus.epochs.clear();
+    let steps: Vec<_> = (0..60_000).map(|_| bus.step(false)).collect();
+    assert!(steps.iter().all(|(_, waits)| !waits) && bus.epochs.is_empty());
+    // Five frames are verified in a step, and of two the true one is among them.
+    assert_eq!(steps.iter().filter(|(passed, _)| *passed).count(), 6000);
+}
+
+/// Somebody lets the true sender pass just when it has a new epoch, and keeps it away until it is told to ask for another.
+#[test]
+fn who_keeps_a_sender_away_again_and_again_uses_up_16_epochs_and_one_in_ten_seconds() {
+    let mut bus = Besieged::new();
+    let mut used = 0;
+    for _ in 0..600_000 {
+        let is_kept_away = bus.epochs.len() == used;
+        if bus.step(is_kept_away).0 {
+            used = bus.epochs.len();
+        }
+    }
+    // 16 at once, and 60 in ten minutes.
+    assert!((74..=76).contains(&used), "{used} epochs");
+    // A sender that starts anew then is heard within ten seconds all the same.
+    let mut longest = 0;
+    for _ in 0..20 {
+        bus.prover = Prover::new(&Keys::bench(Algorithm::SipHash));
+        longest = longest.max(bus.resume());
+    }
+    assert!((5_000..=10_350).contains(&longest), "{longest} ms");
+}

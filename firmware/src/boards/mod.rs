@@ -48,7 +48,8 @@ pub trait Board: Sized {
     type Can: Can<Frame = Frame>;
     /// A light that is on while guidance acts.
     type Status: OutputPin;
-    /// The flash whose last seven pages hold starts and keys ([`crate::keys`]) and parameters ([`crate::storage`]).
+    /// The flash whose last nine pages hold codes of faults ([`crate::codes`]), starts and keys ([`crate::keys`]) and
+    /// parameters ([`crate::storage`]).
     type Flash: NorFlash;
 
     /// The feature that chooses the board.
@@ -77,7 +78,8 @@ pub trait Board: Sized {
     /// taken ([`crate::storage`]).
     fn hardware() -> u32;
 
-    /// The flash. Only touched before the tick starts: while it erases, some boards' processors stand still.
+    /// The flash. Only read and erased before the tick starts: while it erases, some boards' processors stand still. A few
+    /// words may be programmed between two ticks without torque, in less than a millisecond.
     fn flash(&mut self) -> &mut Self::Flash;
 
     /// The free-running microsecond clock, which wraps after 2^32 us.

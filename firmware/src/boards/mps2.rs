@@ -3,7 +3,8 @@
 //!
 //! - UART0: the CAN bus, as SLCAN. UART1: the log. Both transmit at 25 MHz / 16 = 1.5625 Mbaud.
 //! - SysTick: the 1 kHz tick. FPGAIO counter: microseconds. CMSDK timer 0: cycles. LED 0: status.
-//! - Memory that a reset leaves alone plays the flash, which this board does not have ([`crate::nor`]).
+//! - The pseudo-static RAM plays the flash, which this board does not have ([`crate::nor`]): QEMU keeps it in a file if it is
+//!   given one (`cargo xtask qemu --flash`), and through a reset in any case.
 //! - CMSDK watchdog: a non-maskable interrupt after half its time, the reset after all of it.
 //!
 //! Registers as in ARM DAI 0386 (AN386) and the Cortex-M System Design Kit's UART, timer and watchdog. The actuator
@@ -11,7 +12,6 @@
 //! `docs/explanation/monitor-and-memory.md`).
 
 use core::convert::Infallible;
-use core::mem::MaybeUninit;
 
 use cortex_m::interrupt::InterruptNumber;
 
@@ -179,11 +179,14 @@ unsafe impl InterruptNumber for Irq {
 }
 
 /// The flash's memory.
-type Pages = [u8; 7 * PAGE];
+type Pages = [u8; 9 * PAGE];
 
-/// The flash's memory and, once it is delivered, a mark.
-#[unsafe(link_section = ".uninit.flash")]
-static mut FLASH: MaybeUninit<(u32, Pages)> = MaybeUninit::uninit();
+/// The flash's memory and, once it is delivered, a mark, at the beginning of a memory that the linker does not know.
+const FLASH: *mut (u32, Pages) = if cfg!(feature = "mps2-an500") {
+    0x6000_0000
+} else {
+    0x2100_0000
+} as *mut _;
 
 /// Which MAC the keys are for that the flash is delivered with.
 const DELIVERED: Option<Algorithm> = if cfg!(feature = "keys-aes") {
@@ -205,19 +208,14 @@ fn deliver(pages: &mut Pages, algorithm: Algorithm) {
 /// The flash's memory as the last start left it; blank at power-up, as delivered. To be called once.
 fn pages() -> &'static mut Pages {
     const MARK: u32 = 0xF1A5_0001;
-    // SAFETY: the only access, once; every pattern of bits is a value, and the first read is volatile, so that the
-    // compiler does not reason about what it does not see being written.
-    let (mark, pages) = unsafe {
-        let flash = (&raw mut FLASH).cast::<(u32, Pages)>();
-        if (&raw const (*flash).0).read_volatile() != MARK {
-            (&raw mut (*flash).1).write_bytes(0xFF, 1);
-            if let Some(algorithm) = DELIVERED {
-                deliver(&mut (*flash).1, algorithm);
-            }
+    // SAFETY: the only access, once, to memory of the board that nothing else uses; every pattern of bits is a value.
+    let (mark, pages) = unsafe { &mut *FLASH };
+    if *mark != MARK {
+        pages.fill(0xFF);
+        if let Some(algorithm) = DELIVERED {
+            deliver(pages, algorithm);
         }
-        let (mark, pages) = &mut *flash;
-        (mark, pages)
-    };
+    }
     *mark = MARK;
     pages
 }

@@ -15,9 +15,9 @@
 //! The log goes to the debug probe (RTT). SysTick is the tick, TIM2 the microseconds, DWT the cycles, IWDG the
 //! watchdog. Compiled and linked in CI; it has never met the board.
 //!
-//! The flash is one of two banks, as the chip is delivered (option bit DBANK, which is looked at); the parameters are in
-//! the last seven pages of the second. A word whose programming lost power reads as an error that no code of correction
-//! mends: the chip then raises the non-maskable interrupt. Among the parameters what was read fails its CRC, and that is
+//! The flash is one of two banks, as the chip is delivered (option bit DBANK, which is looked at); codes, starts,
+//! keys and parameters are in the last nine pages of the second. A word whose programming lost power reads as an error that no code of correction
+//! mends: the chip then raises the non-maskable interrupt. Among these what was read fails its CRC, and that is
 //! all; anywhere else it is code or a constant, and the torque goes to zero and the processor is reset.
 //!
 //! The column's sensors are read with the feature `nucleo-g474re-sensors` alone, since pins that float read anything.

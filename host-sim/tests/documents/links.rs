@@ -57,7 +57,7 @@ fn every_link_leads_somewhere() {
     }
 }
 
-/// A file that a document names from the repository's root is there.
+/// A file that a document names from the repository's root is there, and a test in it.
 #[test]
 fn every_file_that_is_named_is_there() {
     let tops = [
@@ -75,13 +75,21 @@ fn every_file_that_is_named_is_there() {
         let code = prose.split('`').skip(1).step_by(2);
         for word in code.flat_map(str::split_whitespace) {
             // Evidence is written `tests/file.rs::function`.
-            let word = word.split("::").next().unwrap_or(word);
+            let (word, function) = word.split_once("::").unwrap_or((word, ""));
             let is_path = tops.iter().any(|top| word.starts_with(top));
             // `firmware/src/boards/<board>.x` is a pattern.
             if is_path && !word.contains(['<', '*']) {
                 assert!(
                     root().join(word).exists(),
                     "{}: {word} is not there",
+                    name.display()
+                );
+                let names_function = word.ends_with(".rs") && !function.is_empty();
+                let source = std::fs::read_to_string(root().join(word)).unwrap_or_default();
+                let is_there = source.contains(&format!("fn {function}("));
+                assert!(
+                    !names_function || is_there,
+                    "{}: {word} has no {function}",
                     name.display()
                 );
             }

@@ -1,4 +1,4 @@
-//! `host-sim ecu cost [SCENARIO.toml]`: what authentication costs the ECU.
+//! `host-sim ecu cost [SCENARIO.toml]`: what authentication and a workshop's questions cost the ECU.
 
 use std::path::PathBuf;
 
@@ -9,6 +9,7 @@ use haptic_sim::scenario::Scenario;
 
 use super::super::{BadInput, Outcome, print, print_json};
 use crate::processor::{self, ProcessorError};
+use crate::tester;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -30,14 +31,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Err(ProcessorError::Scenario(message)) => return Err(InputError::new("cost", message).into()),
         Err(_) => unreachable!("nothing is started yet"),
     };
-    let costs = match haptic_pil::cost::measure(&drive) {
-        Ok(costs) => costs,
+    let measured = haptic_pil::cost::measure(&drive).and_then(|costs| Ok((costs, tester::flood()?)));
+    let (mut costs, flood) = match measured {
+        Ok(measured) => measured,
         Err(error @ PilError::Missing(_)) => return Err(error.into()),
         Err(error) => {
             eprintln!("error: {error}");
             return Ok(Outcome::Failed);
         }
     };
+    costs.drives.extend(flood.costs);
     if arguments.json {
         print_json(&costs)?;
         return Ok(Outcome::Good);
@@ -57,5 +60,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             one.taken, one.refused
         ))?;
     }
+    print(&format!(
+        "the products drive 6 s on a straight road; the questions of a millisecond add {} to its step at most, {} frames of answers",
+        flood.added, flood.answers
+    ))?;
     Ok(Outcome::Good)
 }

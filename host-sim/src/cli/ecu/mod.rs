@@ -24,7 +24,7 @@ pub(super) enum Command {
     Parameters(parameters::Arguments),
     /// What a workshop's tester asks of an ECU: stored faults, readings, parameters (UDS)
     Diag(diag::Arguments),
-    /// Instructions of a scenario's steps in QEMU without authentication, with each MAC, and under a flood
+    /// Instructions of a scenario's steps in QEMU without authentication, with each MAC, and under floods
     Cost(cost::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
