@@ -26,7 +26,7 @@ pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("host-sim/batch", 10_050),
     ("host-sim/campaign", 4_150),
     ("host-sim/column", 1_600),
-    ("host-sim/evidence", 7_400),
+    ("host-sim/evidence", 7_430),
     ("host-sim/log", 5_810),
     ("host-sim/metrics", 600),
     ("host-sim/pil", 2_330),

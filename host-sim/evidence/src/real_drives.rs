@@ -172,7 +172,7 @@ struct FileResult<'a> {
     layout: Option<&'a Layout>,
     drives: Vec<RealDrive>,
     hands: Option<(Felt, Vec<Fed>)>,
-    /// With their vehicle.
+    /// Stretches of driving, each with the vehicle that drove it.
     segments: Vec<(String, Segment)>,
 }
 
