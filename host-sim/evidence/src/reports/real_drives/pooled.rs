@@ -15,7 +15,7 @@ pub(super) fn section(pooled: &[Pooled]) -> Vec<Block> {
                 Segments of one vehicle may be of one person: the intervals are over its segments, not over people. The column's equation \
                 holds whoever steers: what it explains is no driver. Planned curvature is the automation's own, also by hand.";
     vec![
-        Block::Text(text),
+        Block::Text(text.to_owned()),
         Block::Table(now(pooled)),
         Block::Table(ahead(pooled)),
     ]
