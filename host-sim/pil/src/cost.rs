@@ -4,7 +4,7 @@
 //! A flood fills each millisecond up to five frames to verify, more than a bus of 500 kbit/s carries beside the ECU's own. The true frames
 //! come behind it, and the ECU's torque has to be the same with it and without, to the bit.
 //!
-//! Not here: what a tester asks, whose answers are worked out behind the step (`tests/flood.rs`).
+//! Not here: what a tester asks, whose answers are worked out behind the step (`tests/pil.rs`).
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Guidance, LanePreview, Message, Request, Vehicle};
