@@ -264,7 +264,7 @@ def test_a_layout_takes_the_shared_stretch_of_somebody_elses_recording():
     recording = LOGS.parent / "layouts" / "openlka.csv"
     low, high = hg.identify(recording, layout="openlka")["k_hg"].interval_95
     assert low <= 0.3 <= high
-    for layout, says in [("open-lka", "one of openlka"), ("udacity", "13 fields where the header has 12")]:
+    for layout, says in [("open-lka", "one of openlka"), ("udacity", "15 fields where the header has 12")]:
         with pytest.raises(hg.InputError, match=says):
             hg.identify(recording, layout=layout)
 
