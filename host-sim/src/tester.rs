@@ -10,15 +10,13 @@ use haptic_core::bus::messages::{Column, Guidance, LanePreview, Message, Request
 use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Instant, Metres, Ratio, Speed, Torque};
 use haptic_core::safety::modes::Mode;
+use haptic_diag::{REQUEST_ID, RESPONSE_ID};
 use haptic_lockstep::{Start, StartState};
 use haptic_pil::PilError;
 use haptic_pil::cost::Cost;
 use haptic_pil::qemu::instructions;
 use haptic_pil::stepped::Stepped;
 
-/// Identifiers of `docs/reference/diagnosis.md`.
-const REQUEST: u16 = 0x730;
-const ANSWER: u16 = 0x738;
 const TICKS: u32 = 6000;
 /// From here on guidance is asked for: its inputs have to have been there for half a second.
 const ENGAGE_AT: u32 = 800;
@@ -83,8 +81,10 @@ fn drive(what: &str, is_flooded: bool) -> Result<Drive, PilError> {
             heard.extend(questions(ms));
         }
         ecu.tick(Instant::from_us(ms * 1000), &heard)?;
-        let (answer, other): (Vec<_>, Vec<_>) =
-            ecu.answer()?.into_iter().partition(|frame| frame.id() == ANSWER);
+        let (answer, other): (Vec<_>, Vec<_>) = ecu
+            .answer()?
+            .into_iter()
+            .partition(|frame| frame.id() == RESPONSE_ID);
         answers += answer.len();
         let guidance = other.iter().find(|frame| frame.id() == Guidance::ID);
         let guidance =
@@ -163,5 +163,5 @@ fn questions(ms: u32) -> [Frame; 3] {
     let flow: &[u8] = &[0x30, 0, 0];
     let rest: &[u8] = &[0x21 + (ms % 2) as u8, 0, 0, 0, 0, 0, 0, 0];
     [question, flow, rest]
-        .map(|data| Frame::new(REQUEST, data).unwrap_or_else(|| unreachable!("at most eight bytes")))
+        .map(|data| Frame::new(REQUEST_ID, data).unwrap_or_else(|| unreachable!("at most eight bytes")))
 }
