@@ -1,7 +1,7 @@
 //! The studies, against what is known without them.
 
 use haptic_column::study::assist::{Column, Group, Study};
-use haptic_column::study::{ColumnFile, ecu, sensors};
+use haptic_column::study::{ColumnFile, ecu, reading, sensors};
 use haptic_sim::models::torsion_bar::{ColumnParameters, Inject};
 
 /// By hand, from the points: at 60 km/h medium's slope is 0.5 on a straight and 3.5 at 2 N.m; held hands feel 1/(1 + g) of an overlay
@@ -110,4 +110,36 @@ fn the_ecu_behind_a_bar_knows_hands_from_none_where_its_parameters_are_right() {
     assert_eq!((hands.warned_s, hands.warned_beside_probe_s), (None, None));
     assert!(hands.yields_ms > right.yields_ms, "{hands:?}");
     assert_eq!(row("a bar, where hands are").found[0].0, "ColumnImplausible");
+}
+
+/// The driver is the paper's, whatever the column; with the medium assist, whose slope on a straight is 0.5, two thirds of the motor's torque come
+/// up to the hands.
+#[test]
+fn a_reading_through_an_assist_is_of_the_motors_torque() {
+    let study = reading::Study {
+        file: ColumnFile::default(),
+    };
+    let cases = study.cases();
+    assert_eq!(cases.len(), 5 * 3 * 8);
+    for case in &cases {
+        let scenario = study.scenario(case).unwrap();
+        assert_eq!(scenario.seed(), scenario.seed().clamp(1, 8));
+        assert!(scenario.gains().k_d >= 2.0, "{:?}", scenario.gains());
+    }
+    // One drive of eight has no reading.
+    let readings: Vec<_> = (0..cases.len())
+        .map(|k| (k % 8 > 0).then_some([0.1 * (k % 8) as f64, 0.5]))
+        .collect();
+    let rows = study.summarise(&cases, &readings);
+    let of_motor: Vec<f64> = rows.iter().map(|row| (1000.0 * row.of_motor).round()).collect();
+    let (plain, assisted) = ([0.0, 300.0, 600.0], [0.0, 200.0, 400.0]);
+    assert_eq!(of_motor, [plain, plain, plain, assisted, assisted].concat());
+    for row in rows {
+        assert_eq!((row.drives, row.reported), (7, 0.5));
+        // 0.1 to 0.7: the mean 0.4, the variance 0.04.
+        assert!(
+            (row.read - 0.4).abs() < 1e-12 && (row.spread - 0.2).abs() < 1e-12,
+            "{row:?}"
+        );
+    }
 }

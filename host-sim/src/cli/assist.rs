@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use haptic_batch::StudyError;
 use haptic_batch::engine::each;
-use haptic_column::study::{ColumnFile, assist, hands, sensors};
-use haptic_report::studies::torsion_bar::{assist_report, hands_report, sensors_report};
+use haptic_column::study::{ColumnFile, assist, hands, reading, sensors};
+use haptic_report::studies::torsion_bar::{assist_report, hands_report, reading_report, sensors_report};
 use haptic_sim::input::in_range;
 
 use super::progress::Threads;
@@ -49,6 +49,9 @@ pub(super) struct SensorArguments {
     /// lasts so many hours, 0.5 if none are given (some 5 minutes of a processor)
     #[arg(long, value_name = "HOURS", num_args = 0..=1, default_missing_value = "0.5")]
     hands: Option<f64>,
+    /// In its place: what the ECU reads of K_hg through the bar, of drivers whose K_hg is known (120 drives)
+    #[arg(long, conflicts_with = "hands")]
+    reading: bool,
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
@@ -82,6 +85,22 @@ pub(super) fn sensors(arguments: &SensorArguments) -> Result<Outcome, BadInput> 
         })??;
         let results = study.summarise(&cases, &driven);
         return output.show(&hands_report(&results), &results, true);
+    }
+    if arguments.reading {
+        let study = reading::Study { file };
+        let cases = study.cases();
+        let drive = |case: &reading::Case| {
+            let scenario = study
+                .scenario(case)
+                .map_err(|e| StudyError::from(e.to_string()))?;
+            let read = haptic_batch::run::run(scenario, false)?.results.k_hg;
+            Ok(read.map(|read| [read.k_hg, read.deviation]))
+        };
+        let readings = progress::watched("drives", |watch| {
+            arguments.threads.run(|| each(&cases, watch, drive))
+        })??;
+        let rows = study.summarise(&cases, &readings);
+        return output.show(&reading_report(&rows), &rows, true);
     }
     let results = sensors::run(&file)?;
     output.show(&sensors_report(&results), &results, true)

@@ -4,11 +4,13 @@
 //! - [`assist`]: overlay or offset, what hands feel of it, margins, what a sudden loss costs.
 //! - [`ecu`]: the ECU behind the bar, where its parameters are right and where they are not.
 //! - [`hands`]: whether a hand is at the wheel, and how soon that is known.
+//! - [`reading`]: what the ECU reads of K_hg through the bar.
 //! - [`sensors`]: the hands' torque by the observer of core, by the angle's sensor.
 
 pub mod assist;
 pub mod ecu;
 pub mod hands;
+pub mod reading;
 pub mod sensors;
 
 use haptic_core::controller::config::Config;

@@ -6,7 +6,7 @@ use haptic_column::study::assist::{
     Column, DRIVEN_KMH, Felt, Group, GroupRow, LoopRow, Results, Spread, WORKING_NM,
 };
 use haptic_column::study::hands::{self, Eye, Hand, Row, Scene};
-use haptic_column::study::{ecu, sensors};
+use haptic_column::study::{ecu, reading, sensors};
 use haptic_sim::models::torsion_bar::Inject;
 
 /// What stands beside every result: what is not part of it.
@@ -184,6 +184,34 @@ fn ecu_table(rows: &[ecu::Row]) -> Table {
         ecu::PUSH_NM
     );
     Table::of_rows(caption, rows.iter().map(row))
+}
+
+/// The document of what the ECU reads of K_hg.
+pub fn reading_report(rows: &[reading::Row]) -> Report {
+    let row = |row: &reading::Row| {
+        [
+            ("The arm acts on", Cell::text(row.column.name())),
+            ("K_hg", Cell::number(row.k_hg, 1)),
+            ("Of the motor's torque", Cell::number(row.of_motor, 3)),
+            ("Read", Cell::number(row.read, 3)),
+            ("Deviation", Cell::number(row.spread, 3)),
+            ("Reported", Cell::number(row.reported, 3)),
+            ("Drives", Cell::number(row.drives as f64, 0)),
+        ]
+    };
+    let caption = "The reading at the end of each drive: mean and standard deviation over the drives, and the standard deviation that the ECU \
+         reports. Beside an assist the ECU reads an arm's answer to the motor's torque, of which 1/(1 + slope) comes up to the hands.";
+    let summary = format!(
+        "The paper's driver on paper-course at 60 km/h, with the probe and a remnant of 0.1 N.m, {} seeds of each. The ECU is told right of its \
+         bar.",
+        reading::SEEDS
+    );
+    let table = Block::Table(Table::of_rows(caption, rows.iter().map(row)));
+    Report::new(
+        "K_hg through a torsion bar",
+        summary,
+        vec![Section::new("", vec![table])],
+    )
 }
 
 /// The document of the sensors.
