@@ -8,6 +8,7 @@ mod design;
 mod faults;
 mod faults_in_qemu;
 mod handover;
+mod identify_bar;
 mod identify_bus_trace;
 mod identify_causes;
 mod identify_changes;

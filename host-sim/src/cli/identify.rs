@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     method: MethodArgument,
     /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms; by
     /// how much a column is late, s: t_h_late, t_d_late; the driver's own line, m: line_offset and line_bend, that in a left bend of
-    /// 300 m at 60 km/h; wheel_inertia); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
+    /// 300 m at 60 km/h; wheel_inertia and wheel_damping, N.m.s/rad; bar_stiffness, N.m/rad, where the angle is that of the column below the bar); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
     /// The column has a power assist that is not in guidance_torque_nm: it turns the wheel with the driver, so that the torques on the

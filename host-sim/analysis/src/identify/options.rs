@@ -27,6 +27,10 @@ pub struct Options {
     pub wheel_inertia: Option<f64>,
     /// Whether that is known exactly: otherwise give or take 10 %.
     pub wheel_inertia_known: bool,
+    /// Damping of that wheel, N.m.s/rad; none where it is not known, so 0 to 0.05.
+    pub wheel_damping: Option<f64>,
+    /// Stiffness of the bar, N.m/rad, where the angle is that of the column below it; none where it is the wheel's.
+    pub bar_stiffness: Option<f64>,
     /// Whether a power assist that is not in T_h turns the wheel with the driver.
     pub assisted: bool,
     /// Known a_1, a_2, a_3.
@@ -69,6 +73,8 @@ impl Default for Options {
             line: [None; 2],
             wheel_inertia: None,
             wheel_inertia_known: false,
+            wheel_damping: None,
+            bar_stiffness: None,
             assisted: false,
             a: [None; 3],
             gain: [None; 3],
@@ -88,9 +94,11 @@ impl Default for Options {
 
 /// Inertia that a steering wheel may have, kg.m2.
 pub const WHEEL_INERTIA_KG_M2: [f64; 2] = [0.0, 0.2];
+/// Damping of a wheel where nobody says more, N.m.s/rad, and its standard deviation: that of its bearings is 0 to 0.05.
+const WHEEL_DAMPING_NMS_PER_RAD: f64 = 0.025;
 
 /// Names that can be fixed, with the range of each.
-const FIXABLE: [(&str, f64, f64); 16] = [
+const FIXABLE: [(&str, f64, f64); 18] = [
     ("a_1", 1e-4, 10.0),
     ("a_2", 1e-4, 10.0),
     ("a_3", 1e-4, 100.0),
@@ -108,6 +116,8 @@ const FIXABLE: [(&str, f64, f64); 16] = [
     ("line_offset", -1.5, 1.5),
     ("line_bend", -1.5, 1.5),
     ("wheel_inertia", WHEEL_INERTIA_KG_M2[0], WHEEL_INERTIA_KG_M2[1]),
+    ("wheel_damping", 0.0, 0.5),
+    ("bar_stiffness", 20.0, 1000.0),
 ];
 
 /// Names that are known unless they are to be estimated, with the range in which they are then searched.
@@ -144,6 +154,13 @@ impl Options {
             ));
         }
         Ok(options)
+    }
+
+    /// Damping of the wheel above a torsion bar, N.m.s/rad: where nobody says more, the middle of what bearings have.
+    pub(crate) fn wheel_damping(&self) -> f64 {
+        self.wheel_damping
+            .or(self.wheel_inertia.map(|_| WHEEL_DAMPING_NMS_PER_RAD))
+            .unwrap_or(0.0)
     }
 
     /// Takes a `NAME=VALUE` and returns the name.
@@ -187,6 +204,8 @@ impl Options {
             "k_hg" => self.k_hg = Some(value),
             "k_nms" => (self.muscle.k_nms, self.k_nms_known) = (value, true),
             "wheel_inertia" => (self.wheel_inertia, self.wheel_inertia_known) = (Some(value), true),
+            "wheel_damping" => self.wheel_damping = Some(value),
+            "bar_stiffness" => self.bar_stiffness = Some(value),
             "line_offset" => self.line[0] = Some(value),
             "line_bend" => self.line[1] = Some(value / BEND_RAD_S),
             "t_h_late" => self.late_s[0] = value,
@@ -268,6 +287,17 @@ impl Options {
     /// # Errors
     /// What contradicts what, or could.
     pub fn check(&self) -> Result<(), FixError> {
+        let of_wheel = [
+            ("wheel_damping", self.wheel_damping),
+            ("bar_stiffness", self.bar_stiffness),
+        ];
+        if let Some((name, _)) = of_wheel.iter().find(|(_, value)| value.is_some())
+            && self.wheel_inertia.is_none()
+        {
+            return Err(FixError(format!(
+                "--fix {name}: --wheel-inertia is wanted beside it, or --fix wheel_inertia: without one no wheel turns above a torsion bar"
+            )));
+        }
         let given: Vec<usize> = (0..3).filter(|&i| self.a[i].is_some()).collect();
         if let Some(i) = (0..3).find(|&i| self.a[i].is_some() && self.gain[i].is_some() && self.k_d.is_some())
         {

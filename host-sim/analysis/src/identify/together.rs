@@ -103,6 +103,15 @@ impl Prepared {
             all.extend(std::iter::repeat_n(first, padding));
             all.extend(more);
         }
+        if let (Some(all), Some(more)) = (&mut self.wheel, next.wheel) {
+            for (all, more) in [
+                (&mut all.rate, more.rate),
+                (&mut all.acceleration, more.acceleration),
+            ] {
+                all.resize(from, 0.0);
+                all.extend(more);
+            }
+        }
         self.stretches
             .extend(next.stretches.into_iter().map(|s| s.start + from..s.end + from));
         let moved = |d: LaneDoubt| LaneDoubt {

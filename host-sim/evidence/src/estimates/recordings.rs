@@ -12,6 +12,7 @@ use haptic_analysis::identify::{
 };
 use haptic_log::formats::Format;
 use haptic_log::trace::Trace;
+use haptic_sim::models::torsion_bar::{ColumnKind, ColumnParameters};
 use haptic_sim::simulation;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -35,6 +36,9 @@ pub struct Channel {
     pub probe: bool,
     /// Moment of inertia of the wheel, which lies between the hands and the torsion bar, kg.m2. Zero: the hands' torque.
     pub wheel_kg_m2: f64,
+    /// Friction of that wheel, N.m, where the drive goes through the simulator's column with a bar, of 143 N.m/rad; none: the paper's column
+    /// of one piece, and the bar's torque is `T_d - J_w phi''`.
+    pub plant_friction_nm: Option<f64>,
     /// What `identify` is told of it as `--wheel-inertia`, kg.m2.
     pub told_kg_m2: Option<f64>,
     /// Standard deviation of each lane line, m.
@@ -46,6 +50,7 @@ const ROAD: Channel = Channel {
     length_s: 60.0,
     probe: false,
     wheel_kg_m2: 0.04,
+    plant_friction_nm: None,
     told_kg_m2: None,
     line_noise_m: 0.02,
 };
@@ -65,8 +70,16 @@ const fn told(inertia_kg_m2: f64) -> Channel {
     }
 }
 
+const fn plant(friction_nm: f64) -> Channel {
+    Channel {
+        wheel_kg_m2: 0.044,
+        plant_friction_nm: Some(friction_nm),
+        ..told(0.044)
+    }
+}
+
 /// The channels, with what each is.
-pub const CHANNELS: [(&str, Channel); 14] = [
+pub const CHANNELS: [(&str, Channel); 17] = [
     ("10 Hz, 60 s, no probe, torsion bar", ROAD),
     ("10 Hz, 130 s, no probe, torsion bar", LONG),
     ("10 Hz, 60 s, probe, torsion bar", Channel { probe: true, ..ROAD }),
@@ -107,6 +120,18 @@ pub const CHANNELS: [(&str, Channel); 14] = [
     ("100 Hz, 130 s, probe, torsion bar, told 10 % more", told(0.044)),
     ("100 Hz, 130 s, probe, torsion bar, told 30 % less", told(0.028)),
     ("100 Hz, 130 s, probe, torsion bar, told 30 % more", told(0.052)),
+    (
+        "100 Hz, 130 s, probe, the simulator's bar, its wheel told",
+        plant(0.0),
+    ),
+    (
+        "100 Hz, 130 s, probe, the simulator's bar, its wheel told, with 0.01 N.m of friction",
+        plant(0.01),
+    ),
+    (
+        "100 Hz, 130 s, probe, the simulator's bar, its wheel told, with 0.1 N.m of friction",
+        plant(0.1),
+    ),
 ];
 
 /// Records the guided drives of `plan` with `seeds` seeds from its own on by each of [`CHANNELS`], and identifies each as `identify
@@ -119,16 +144,28 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
     let layout = Layout::named("openlka")?;
     let jobs = guided(plan, seeds)?;
     let found = each(&jobs, watch, |&(number, truth, seed)| {
-        let drive = |probe_nm| {
+        let drive = |channel: &Channel| {
+            let probe_nm = if channel.probe { plan.probe_nm } else { 0.0 };
             let plan = ExperimentPlan {
                 seed: plan.seed.wrapping_add(seed),
                 probe_nm,
                 ..plan.clone()
             };
-            let scenario = scenario_of_drive(&plan, number, &truth, truth.parameters())?;
+            let mut scenario = scenario_of_drive(&plan, number, &truth, truth.parameters())?;
+            if let Some(upper_friction_nm) = channel.plant_friction_nm {
+                let column = ColumnParameters {
+                    kind: ColumnKind::TorsionBar,
+                    j_w_kg_m2: channel.wheel_kg_m2,
+                    upper_friction_nm,
+                    lower_friction_nm: 0.3,
+                    ..ColumnParameters::default()
+                };
+                let guidance = scenario.guidance().clone().told_of(&column);
+                scenario = scenario.to_builder().column(column).guidance(guidance).build()?;
+            }
             Ok::<_, StudyError>(simulation::simulate(&scenario).trace)
         };
-        let drives = [drive(0.0)?, drive(plan.probe_nm)?];
+        let of_rigid = [drive(&ROAD)?, drive(&PROBED)?];
         let mut random = Xoshiro256PlusPlus::seed_from_u64(
             plan.seed
                 .wrapping_add(seed)
@@ -136,11 +173,14 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
                 .wrapping_add(u64::from(number)),
         );
         let fit = |(_, channel): &(&str, Channel)| {
-            let bytes = channel.record(&drives[usize::from(channel.probe)], &mut random);
-            let fit = identified(bytes, &layout, channel.told_kg_m2);
-            fit.map(|fit| (compared(&truth, &fit.parameters), fit))
+            let bytes = match channel.plant_friction_nm {
+                None => channel.record(&of_rigid[usize::from(channel.probe)], &mut random),
+                Some(_) => channel.record(&drive(channel)?, &mut random),
+            };
+            let fit = identified(bytes, &layout, channel.told_kg_m2)?;
+            Ok((compared(&truth, &fit.parameters), fit))
         };
-        Ok(CHANNELS.iter().map(fit).collect::<Result<Vec<_>, LogError>>()?)
+        CHANNELS.iter().map(fit).collect::<Result<Vec<_>, StudyError>>()
     })?;
     let lines = CHANNELS.iter().enumerate().map(|(k, (name, _))| {
         let fits: Vec<([Compared; COMPARED], Identification)> =
@@ -211,7 +251,10 @@ impl Channel {
                 * drive.sample_rate_hz
                 * (samples[k + 1].wheel_rate_rad_per_s - samples[k - 1].wheel_rate_rad_per_s);
             // Torque in steps of 0.01 N.m, angle of 1/16 deg.
-            let torque = 0.01 * (100.0 * (now.driver_torque_nm - self.wheel_kg_m2 * acceleration)).round();
+            let torque = now
+                .bar_torque_nm
+                .unwrap_or(now.driver_torque_nm - self.wheel_kg_m2 * acceleration);
+            let torque = 0.01 * (100.0 * torque).round();
             let angle = (16.0 * now.wheel_angle_rad.to_degrees()).round() / 16.0;
             let [left, right] = [-1.8, 1.8].map(|line| now.lateral_error_m + line + noise.sample(random));
             let speed = now.speed_m_per_s;

@@ -245,6 +245,12 @@ impl DriveLog {
             format!("{} at {rate_hz:.0} Hz", self.len()),
             format!("one of {every} used"),
         ]);
+        self.keep_every(every);
+        self
+    }
+
+    /// Leaves the first of so many rows each.
+    pub(crate) fn keep_every(&mut self, every: usize) {
         for signal in self.signals_mut() {
             *signal = signal.iter().copied().step_by(every).collect();
         }
@@ -256,7 +262,6 @@ impl DriveLog {
             .skip(every - 1)
             .step_by(every)
             .collect();
-        self
     }
 
     /// Its beginning, where there are more rows than a fit gains from and it is longer than [`LONGEST_S`].

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use super::delays::{Delays, Line};
 use super::sums::Rows;
 use super::{
-    COUNT, D_LATE, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, OWN_BEND, OWN_OFFSET, Problem, T_NMS, T_P, WHEEL,
+    COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, OWN_BEND, OWN_OFFSET, Problem, T_NMS, T_P,
+    WHEEL,
 };
 use crate::identify::search::{Quadratic, covariance, step};
 
@@ -92,7 +93,7 @@ impl Problem<'_> {
     /// What freeing each assumption would do: a score test of each, with the `free` parameters following.
     pub(super) fn alternatives(&self, p: &[f64], free: &[usize], variance: f64) -> Vec<Alternative> {
         let full = self.all_sums(p);
-        [K_NMS, T_NMS, H_LATE, D_LATE, WHEEL, OWN_OFFSET, OWN_BEND]
+        [K_NMS, T_NMS, H_LATE, D_LATE, WHEEL, DAMPING, OWN_OFFSET, OWN_BEND]
             .into_iter()
             .filter(|&x| !(self.is_free(x) || x == H_LATE && p[K_HG] == 0.0))
             .filter_map(|place| freed(&full, free, place, variance))

@@ -9,8 +9,8 @@ use super::evidence::Alternative;
 use super::sums::Rows;
 use super::uncertainty::Doubts;
 use super::{
-    Assumed, COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem, SMALLEST_ERROR_NM,
-    START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS, WHEEL,
+    Assumed, COMPARED, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem,
+    SMALLEST_ERROR_NM, START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS, WHEEL, WHEEL_SHARE,
 };
 use crate::identify::balance::Balance;
 use crate::identify::change::{BLIP_S, Change, Power, SWING_S, Shape};
@@ -175,10 +175,22 @@ impl Problem<'_> {
         found.notes.extend(hidden_gain_2(&mut found.parameters.gain_2));
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
-            Some(inertia) => format!(
-                "driver_torque_nm is that of a torsion bar below a wheel of {inertia} kg.m2{}: the torque of the hands was made of it",
-                if options.wheel_inertia_known { "" } else { ", give or take 10 %, which the errors hold" }
-            ),
+            Some(inertia) => {
+                let leeway = |is_known, text| if is_known { String::new() } else { text };
+                format!(
+                    "driver_torque_nm is that of a torsion bar below a wheel without friction, of {inertia} kg.m2{} and {} N.m.s/rad{}: the \
+                     torque of the hands was made of it, in 20 rows a second at most",
+                    leeway(
+                        options.wheel_inertia_known,
+                        format!(" (give or take {} %)", 100.0 * WHEEL_SHARE)
+                    ),
+                    options.wheel_damping(),
+                    leeway(
+                        options.wheel_damping.is_some(),
+                        format!(" (give or take {}), which the errors hold", options.wheel_damping())
+                    ),
+                )
+            }
             None => "driver_torque_nm is the torque of the hands: no wheel turns between them and the sensor".to_owned(),
         });
         if options.assisted {
@@ -373,8 +385,8 @@ impl Problem<'_> {
             let Some(a) = alternatives.iter().find(|a| a.place == known.place) else {
                 continue;
             };
-            // Of a wheel's inertia the record says nothing: the steps of its angle make accelerations of their own.
-            let seen = if known.place == WHEEL {
+            // Of a wheel the record says nothing: the steps of its angle make accelerations of their own.
+            let seen = if [WHEEL, DAMPING].contains(&known.place) {
                 f64::INFINITY
             } else {
                 a.error.powi(2)

@@ -50,7 +50,7 @@ use super::result::{Identification, SAME_LINE, Start};
 use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
 use super::signals::{Muscle, Signals};
 use super::switches::Switches;
-use super::wheel::acceleration;
+use super::wheel::WheelMotion;
 
 /// Longest delay that is searched, s: twice table 4's, to hold the paper's inattentive driver (0.5 s).
 pub const LONGEST_DELAY_S: f64 = 0.6;
@@ -76,7 +76,9 @@ const H_LATE: usize = 11;
 const D_LATE: usize = 12;
 /// Inertia of the wheel above a torsion bar.
 const WHEEL: usize = 13;
-const COUNT: usize = 14;
+/// Its damping.
+const DAMPING: usize = 14;
+const COUNT: usize = 15;
 /// Keys of the parameters that are the driver's and the sensors', by place. The constants of the stretches follow.
 const NAMES: [Option<&str>; COUNT] = [
     Some("gain_1"),
@@ -93,6 +95,7 @@ const NAMES: [Option<&str>; COUNT] = [
     Some("t_h_late"),
     Some("t_d_late"),
     Some("wheel_inertia"),
+    Some("wheel_damping"),
 ];
 
 /// Widths of the variation intervals (see [`super::result`]): table 4 times the default K_d + K_nms = 4.
@@ -111,6 +114,7 @@ const VARIATION_WIDTHS: [f64; COUNT] = [
     0.1,
     0.1,
     0.04,
+    0.05,
 ];
 
 /// The turn of the road in a bend of 300 m at 60 km/h, rad/s: what a line in bends is judged by.
@@ -141,7 +145,7 @@ const T_NMS_SD_S: f64 = 0.03;
 /// are usual.
 const K_NMS_SD: f64 = 0.25;
 /// The standard deviation of a wheel's inertia about what the caller says, as a share: a wheel is seldom weighed.
-const WHEEL_SHARE: f64 = 0.1;
+pub(super) const WHEEL_SHARE: f64 = 0.1;
 /// Where both are searched once they are freed, N.m/rad and s.
 const K_NMS_SEARCHED: [f64; 2] = [0.0, 4.0];
 const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
@@ -198,8 +202,8 @@ struct Problem<'a> {
     /// line.
     assumed: Vec<Assumed>,
     signals: Signals,
-    /// phi'', where a wheel turns above a torsion bar.
-    wheel_acceleration: Option<Vec<f64>>,
+    /// Of the wheel above a torsion bar, where there is one.
+    wheel: Option<&'a WheelMotion>,
     bounds: Vec<Bounds>,
     /// Rows that the loss is taken over.
     stretches: Vec<Range<usize>>,
@@ -275,7 +279,9 @@ impl<'a> Problem<'a> {
             bounds[K_NMS + i] = range.map_or(Bounds::new(value, value), |[low, high]| Bounds::new(low, high));
         }
         let inertia = options.wheel_inertia.unwrap_or(0.0);
+        let damping = options.wheel_damping();
         bounds[WHEEL] = Bounds::new(inertia, inertia);
+        bounds[DAMPING] = Bounds::new(damping, damping);
         let untimed = Switches::of(log).are_untimed();
         // Anywhere in a row: its standard deviation is that over the root of twelve.
         let of_row_s = log.dt_s / 12.0_f64.sqrt();
@@ -288,6 +294,12 @@ impl<'a> Problem<'a> {
                 WHEEL,
                 inertia,
                 WHEEL_SHARE * inertia,
+            ),
+            (
+                inertia > 0.0 && options.wheel_damping.is_none(),
+                DAMPING,
+                damping,
+                damping,
             ),
             (
                 untimed && options.estimate[2].is_none(),
@@ -306,9 +318,7 @@ impl<'a> Problem<'a> {
                 .map(|(_, place, value, sd)| Assumed { place, value, sd })
                 .collect(),
             signals,
-            wheel_acceleration: options
-                .wheel_inertia
-                .map(|_| acceleration(&log.wheel_angle_rad, log.dt_s)),
+            wheel: prepared.wheel.as_ref(),
             bounds,
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],
@@ -476,7 +486,9 @@ impl<'a> Problem<'a> {
         point[..LINEAR].copy_from_slice(&START);
         point[K_NMS] = self.muscle.k_nms;
         point[T_NMS] = self.muscle.t_nms_s;
-        point[WHEEL] = self.bounds[WHEEL].low;
+        for i in [WHEEL, DAMPING] {
+            point[i] = self.bounds[i].low;
+        }
         point[RHO] = (-std::f64::consts::TAU * corner_hz * self.signals.dt_s).exp();
         for (x, b) in point.iter_mut().zip(&self.bounds) {
             *x = x.clamp(b.low, b.high);

@@ -9,8 +9,8 @@ use std::ops::Range;
 
 use super::delays::Line;
 use super::{
-    CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P, THETA, WHEEL,
-    at,
+    CORE, COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P, THETA,
+    WHEEL, at,
 };
 use crate::identify::signals::Delay;
 use crate::identify::wide::BLOCK;
@@ -129,8 +129,9 @@ impl<const N: usize> Block<N> {
             self.columns[T_NMS][i] = -rate(arm, lagged);
             self.columns[H_LATE][i] = -h_rate;
             self.columns[D_LATE][i] = self.columns[T_P][i] + h_rate + w_rate;
-            // The torque of the hands holds J phi''.
-            self.columns[WHEEL][i] = problem.wheel_acceleration.as_ref().map_or(0.0, |a| -a[k]);
+            // The torque of the hands holds J phi'' + B phi'.
+            self.columns[WHEEL][i] = problem.wheel.map_or(0.0, |w| -w.acceleration[k]);
+            self.columns[DAMPING][i] = problem.wheel.map_or(0.0, |w| -w.rate[k]);
         }
     }
 

@@ -19,7 +19,7 @@ pub use stretches::{LeftOut, Reason};
 use super::lane::{LaneDoubt, LaneNoise, Smoothed, smooth};
 use super::log::{COLUMNS, DriveLog};
 use super::options::Options;
-use super::wheel::add_wheel;
+use super::wheel::{WHEEL_ROWS_S, WheelMotion};
 
 /// Changes of e_y, e_theta, wheel angle, T_h and T_d below which a sample is never out of line: m, rad, rad, N.m, N.m.
 const LEAST: [f64; 5] = [5e-3, 5e-4, 1e-2, 0.06, 0.06];
@@ -115,7 +115,30 @@ pub(crate) struct Prepared {
     pub stretches: Vec<Range<usize>>,
     /// What is not known of the lane signals for the whole record.
     pub lane_doubts: Vec<LaneDoubt>,
+    /// Of the wheel above a torsion bar, where there is one.
+    pub wheel: Option<WheelMotion>,
     pub preflight: Preflight,
+}
+
+impl Prepared {
+    /// Leaves the first of so many rows each.
+    fn keep_every(&mut self, every: usize) {
+        if every < 2 {
+            return;
+        }
+        self.log.keep_every(every);
+        let doubts = self.lane_doubts.iter_mut().map(|doubt| &mut doubt.signal);
+        let wheel = self
+            .wheel
+            .iter_mut()
+            .flat_map(|w| [&mut w.rate, &mut w.acceleration]);
+        for signal in doubts.chain(wheel) {
+            *signal = signal.iter().copied().step_by(every).collect();
+        }
+        for stretch in &mut self.stretches {
+            *stretch = stretch.start.div_ceil(every)..stretch.end.div_ceil(every);
+        }
+    }
 }
 
 /// Examines, repairs and cuts `log`.
@@ -179,19 +202,34 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         speeds_m_per_s: log.speeds_m_per_s,
         findings: Vec::new(),
     };
-    if let Some(inertia) = options.wheel_inertia {
-        add_wheel(&mut clean.driver_torque_nm, &clean.wheel_angle_rad, dt, inertia);
-    }
+    let wheel = options.wheel_inertia.map(|inertia| {
+        if let Some(stiffness) = options.bar_stiffness {
+            let bar = clean.driver_torque_nm.iter();
+            clean
+                .wheel_angle_rad
+                .iter_mut()
+                .zip(bar)
+                .for_each(|(phi, bar)| *phi += bar / stiffness);
+        }
+        let wheel = WheelMotion::of(&clean.wheel_angle_rad, dt);
+        wheel.add_to(&mut clean.driver_torque_nm, inertia, options.wheel_damping());
+        wheel
+    });
     preflight.lane_noise = lane_noise;
     let (stretches, left_out) = stretches::stretches(log, &clean, &bad, lane_noise, options);
     preflight.left_out = left_out;
     preflight.used_s = stretches.iter().map(|s| s.len() as f64 * dt).sum();
-    Prepared {
+    let mut prepared = Prepared {
         log: clean,
         stretches,
         lane_doubts,
+        wheel,
         preflight,
+    };
+    if prepared.wheel.is_some() {
+        prepared.keep_every((WHEEL_ROWS_S / dt).round() as usize);
     }
+    prepared
 }
 
 /// e_y (lane 0) or e_theta (1) without the camera's noise.
