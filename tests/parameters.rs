@@ -6,7 +6,7 @@
 //! is done to the same image behind a serial port.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use crate::machine::{Machine, image};
 use haptic_core::bus::Frame;
@@ -17,6 +17,8 @@ use haptic_core::quantity::Speed;
 use haptic_core::service::download;
 use haptic_pil::live::{Listener, View};
 use haptic_pil::parameters::Product;
+use haptic_secoc::Keys;
+use haptic_secoc::fresh::Algorithm;
 
 const BOARD: &str = "mps2-an386";
 const STANDBY: u64 = 1;
@@ -160,8 +162,8 @@ fn a_set_that_is_wrong_changes_nothing_and_is_told() {
     }
 }
 
-#[test]
-fn the_workbench_stores_a_set_over_a_serial_adapter() {
+/// The image behind a serial port, and a client of it.
+fn on_a_serial_port(bin: &str) -> (Child, Product) {
     let mut qemu = Command::new("qemu-system-arm")
         .args(["-machine", BOARD, "-display", "none", "-monitor", "none"])
         .args(["-serial", "pty", "-serial", "null"])
@@ -169,7 +171,7 @@ fn the_workbench_stores_a_set_over_a_serial_adapter() {
         .args(["-icount", "shift=5,sleep=on"])
         .args(["-semihosting-config", "enable=on,target=native"])
         .arg("-kernel")
-        .arg(image(BOARD, "steering-ecu"))
+        .arg(image(BOARD, bin))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .spawn()
@@ -179,24 +181,47 @@ fn the_workbench_stores_a_set_over_a_serial_adapter() {
     said.read_line(&mut line).unwrap();
     // "char device redirected to /dev/pts/3 (label serial0)"
     let port = line.split_whitespace().find(|word| word.starts_with("/dev/"));
-    let mut product = Product::on(port.unwrap_or_else(|| panic!("QEMU says: {line}"))).unwrap();
+    let product = Product::on(port.unwrap_or_else(|| panic!("QEMU says: {line}"))).unwrap();
+    (qemu, product)
+}
+
+const SOFTER: Params = Params {
+    torque_limit_nm: 3.0,
+    ..Params::PAPER
+};
+
+#[test]
+fn an_ecu_with_keys_stores_a_set_with_proofs_alone() {
+    let (mut qemu, mut product) = on_a_serial_port("keys-siphash");
+    let refused = product.store(&SOFTER, 7).unwrap_err().to_string();
+    assert!(refused.contains("still has set 0 in use"), "{refused}");
+    // A sender of another algorithm proves nothing either.
+    product.prove(Some(&Keys::bench(Algorithm::AesCmac)));
+    assert!(product.store(&SOFTER, 7).is_err());
+    product.prove(Some(&Keys::bench(Algorithm::SipHash)));
+    let stored = (0..ATTEMPTS).find_map(|_| product.store(&SOFTER, 7).ok());
+    assert!(stored.is_some_and(|stored| stored.stored), "{stored:?}");
+    assert_eq!(product.values().unwrap().torque_limit_nm, 3.0);
+    qemu.kill().unwrap();
+    qemu.wait().unwrap();
+}
+
+#[test]
+fn the_workbench_stores_a_set_over_a_serial_adapter() {
+    let (mut qemu, mut product) = on_a_serial_port("steering-ecu");
     let status = product.status().unwrap();
     assert_eq!(
         (status.stored, status.damaged, status.sequence),
         (false, false, 0)
     );
-    let softer = Params {
-        torque_limit_nm: 3.0,
-        ..Params::PAPER
-    };
     // Under load, a set may come late: the machine does not wait for its client.
-    let stored = (0..ATTEMPTS).find_map(|_| product.store(&softer, 654_321).ok());
+    let stored = (0..ATTEMPTS).find_map(|_| product.store(&SOFTER, 654_321).ok());
     let stored = stored.expect("a set in time, in one attempt of many");
     assert_eq!((stored.stored, stored.damaged), (true, false));
     // Not within ten seconds of the restart, lest somebody wears the flash out. An attempt that comes later than that is
     // stored, and causes the restart of the next.
     let refused = (0..ATTEMPTS).find_map(|_| {
-        let why = product.store(&softer, 654_321).err()?.to_string();
+        let why = product.store(&SOFTER, 654_321).err()?.to_string();
         why.contains("ten seconds after a reset").then_some(why)
     });
     assert!(refused.is_some(), "no attempt of many was refused");

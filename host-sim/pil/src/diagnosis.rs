@@ -16,6 +16,7 @@ pub use haptic_diag::security::{BENCH_KEY, BYTES as KEY_BYTES, Key};
 use haptic_diag::server::COMMIT;
 use haptic_diag::trouble::{code_of, fault_of};
 use haptic_diag::{REQUEST_ID, RESPONSE_ID};
+use haptic_secoc::Keys;
 
 use super::PilError;
 use super::parameters::{Product, standing};
@@ -75,6 +76,11 @@ impl Tester {
             began: Instant::now(),
             standing: None,
         })
+    }
+
+    /// Proves under these keys what it sends beside its questions.
+    pub fn prove(&mut self, keys: Option<&Keys>) {
+        self.product.prove(keys);
     }
 
     /// The faults that the ECU stored.

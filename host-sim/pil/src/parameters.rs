@@ -16,6 +16,7 @@ use haptic_core::controller::config::Config;
 use haptic_core::controller::params::{PARAMETERS, Params};
 use haptic_core::safety::modes::Mode;
 use haptic_core::service::download::{frames, mode_for_parameters, unlock};
+use haptic_secoc::Keys;
 
 use super::PilError;
 use super::port::Port;
@@ -50,6 +51,13 @@ impl Product {
             port: Port::open(adapter)?,
             hears_speed: false,
         })
+    }
+
+    /// Proves under these keys what it sends.
+    pub fn prove(&mut self, keys: Option<&Keys>) {
+        if let Some(keys) = keys {
+            self.port.prove(keys);
+        }
     }
 
     /// Which set is in use, and what became of the last one sent.
@@ -93,6 +101,8 @@ impl Product {
                 {
                     before = now;
                 }
+                // It gives a message its epoch behind the first frame.
+                Err((now, _)) if self.port.proves() && attempts == 1 => before = now,
                 Err((_, why)) => return Err(PilError::Failed(why)),
             }
         }

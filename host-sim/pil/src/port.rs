@@ -2,11 +2,14 @@
 //!
 //! Not here: the way to the adapter (`adapter`), and what the frames mean.
 
+use std::hash::{BuildHasher, RandomState};
 use std::io::Write;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use haptic_core::bus::Frame;
+use haptic_secoc::Keys;
+use haptic_secoc::prover::Prover;
 
 use super::adapter::{self, Adapter};
 use super::link::{self, Decoder, Unread};
@@ -23,6 +26,7 @@ pub(super) struct Port {
     pending: std::vec::IntoIter<u8>,
     decoder: Decoder,
     channel: Channel,
+    prover: Option<Prover>,
 }
 
 impl Port {
@@ -38,6 +42,7 @@ impl Port {
             pending: Vec::new().into_iter(),
             decoder: Decoder::new(channel),
             channel,
+            prover: None,
         };
         if channel == Channel::Slcan {
             port.write(link::OPEN)?;
@@ -45,12 +50,29 @@ impl Port {
         Ok(port)
     }
 
+    /// Sends with proofs under these keys from now on.
+    pub(super) fn prove(&mut self, keys: &Keys) {
+        self.prover = Some(Prover::new(keys));
+    }
+
+    pub(super) fn proves(&self) -> bool {
+        self.prover.is_some()
+    }
+
     /// All in one piece: what belongs together is not torn apart where this computer is busy.
     pub(super) fn send(&mut self, frames: &[Frame]) -> Result<(), PilError> {
-        let bytes: Vec<u8> = frames
-            .iter()
-            .flat_map(|frame| link::encode(self.channel, frame))
-            .collect();
+        match &mut self.prover {
+            None => self.send_as_they_are(frames),
+            Some(prover) => {
+                let proven: Vec<Frame> = frames.iter().flat_map(|frame| prover.prove(frame)).collect();
+                self.send_as_they_are(&proven)
+            }
+        }
+    }
+
+    fn send_as_they_are(&mut self, frames: &[Frame]) -> Result<(), PilError> {
+        let bytes = frames.iter().flat_map(|frame| link::encode(self.channel, frame));
+        let bytes: Vec<u8> = bytes.collect();
         self.write(&bytes)
     }
 
@@ -63,9 +85,15 @@ impl Port {
     pub(super) fn frame(&mut self) -> Result<Option<Frame>, PilError> {
         loop {
             for byte in self.pending.by_ref() {
-                if let Some(frame) = self.decoder.push(byte)? {
-                    return Ok(Some(frame));
+                let Some(frame) = self.decoder.push(byte)? else {
+                    continue;
+                };
+                if let Some(prover) = &mut self.prover {
+                    // By chance: each state is keyed anew.
+                    let questions = prover.hear(&frame, || RandomState::new().hash_one(0_u8) as u32);
+                    self.send_as_they_are(&questions)?;
                 }
+                return Ok(Some(frame));
             }
             match self.bytes.recv_timeout(REOPEN) {
                 Ok(bytes) => self.pending = bytes.into_iter(),

@@ -13,6 +13,7 @@ use haptic_sim::input::{InputError, did_you_mean};
 use serde_json::{Map, Value, json};
 
 use super::super::{BadInput, Outcome, print, print_json, width};
+use super::keys;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -63,10 +64,14 @@ struct Write {
     #[arg(
         long,
         value_name = "FILE",
-        required_unless_present = "bench_key",
-        conflicts_with = "bench_key"
+        required_unless_present_any = ["bench_key", "keys"],
+        conflicts_with_all = ["bench_key", "keys"]
     )]
     key: Option<PathBuf>,
+    /// In its place: all keys of the ECU, of `cargo xtask keys`, so that the speeds of zero that are sent where nobody else sends any are
+    /// believed by an ECU with keys
+    #[arg(long, value_name = "keys.toml", conflicts_with = "bench_key")]
+    keys: Option<PathBuf>,
     /// The key of images for the bench, which everybody knows
     #[arg(long)]
     bench_key: bool,
@@ -101,8 +106,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Command::Write(write) => {
             let values = write.values.iter().map(|text| value(text));
             let values = values.collect::<Result<Vec<_>, InputError>>()?;
-            let key = key(write)?;
+            let keys = write.keys.as_deref().map(keys::load).transpose()?;
+            let (proofs, key) = match keys {
+                Some((proofs, access)) => (Some(proofs), access),
+                None => (None, key(write)?),
+            };
             let ask = |tester: &mut Tester| {
+                tester.prove(proofs.as_ref());
                 let status = tester.write(&values, &key)?;
                 let back = values.iter().map(|(entry, _)| Ok((*entry, tester.read(entry)?)));
                 Ok((status.sequence, back.collect::<Result<Vec<_>, PilError>>()?))

@@ -3,6 +3,7 @@
 mod bus;
 mod cost;
 mod diag;
+mod keys;
 mod live;
 mod parameters;
 mod pil;

@@ -12,6 +12,7 @@ use haptic_report::document::{Cell, Table};
 use serde_json::json;
 
 use super::super::{BadInput, Outcome, print, print_json, width};
+use super::keys;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -30,6 +31,9 @@ pub(in crate::cli) struct Arguments {
     /// Store the set even if the ECU has one of another vehicle
     #[arg(long, requires = "scenario")]
     other_vehicle: bool,
+    /// The ECU's keys, of `cargo xtask keys`: an ECU with keys takes a set with proofs alone
+    #[arg(long, value_name = "keys.toml", requires = "scenario")]
+    keys: Option<PathBuf>,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -40,7 +44,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(path) => Some(haptic_batch::files::load_scenario(path)?.controller_params()),
         None => None,
     };
+    let keys = arguments.keys.as_deref().map(keys::load).transpose()?;
     let told = Product::on(&arguments.can).and_then(|mut product| {
+        product.prove(keys.as_ref().map(|(keys, _)| keys));
         let status = match &params {
             Some(params) => store(&mut product, params, arguments),
             None => product.status(),
