@@ -152,7 +152,7 @@ impl Study {
         file.with(builder).guidance(told).build()
     }
 
-    /// Of what each drive's last reading is: value and standard deviation; none where there is none.
+    /// A row for each K_hg on each column. A reading is the last of its drive, value and standard deviation; none where there was none.
     pub fn summarise(&self, cases: &[Case], readings: &[Option<[f64; 2]>]) -> Vec<Row> {
         let slope = self.file.one_curve().1.assist().slope(0.0, SPEED_KMH / 3.6);
         let row = |column, k_hg| {
