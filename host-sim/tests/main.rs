@@ -7,6 +7,7 @@ mod course;
 mod design_guidance;
 mod documents;
 mod file_fields;
+mod processor;
 mod recordings;
 mod study;
 mod sweep;
