@@ -90,7 +90,7 @@ pub fn identify(
 ) -> Result<IdentifiedDrive, FixError> {
     let (identification, tracking) = match method {
         Method::NoiseModel => {
-            options.check()?;
+            options.check(log)?;
             identify_and_track(log, options)
         }
         Method::Paper => (identify_as_published(log, options)?, track(log, options)),
@@ -117,7 +117,9 @@ pub fn identify_several(
     logs: &[DriveLog],
     options: &Options,
 ) -> Result<IdentifiedDrive, StudyError> {
-    options.check()?;
+    for log in logs {
+        options.check(log)?;
+    }
     let (identification, tracking) = identify_together_and_track(logs, options)?;
     Ok(drive_of(name, identification, tracking))
 }

@@ -118,6 +118,7 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, StudyError
         notes: failure_notes(scenario.failure().time_s, &[record], window)
             .into_iter()
             .chain(sensor_note(&scenario))
+            .chain(k_hg.and_then(|_| friction_note(&scenario)))
             .collect(),
     };
     let unguided = stretches(&run.trace).unwrap_or_default();
@@ -130,6 +131,16 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, StudyError
         readings,
         bus,
         results,
+    })
+}
+
+/// Why what the ECU read of K_hg is not to be believed.
+fn friction_note(scenario: &Scenario) -> Option<String> {
+    let column = scenario.column();
+    let is_hidden = column.has_bar() && column.upper_friction_nm > 0.0;
+    is_hidden.then(|| {
+        let note = "friction of the wheel, column.upper_friction_nm, makes what the ECU reads of K_hg through a bar wrong";
+        format!("{note}: docs/explanation/torsion-bar.md")
     })
 }
 

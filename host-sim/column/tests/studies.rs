@@ -120,7 +120,7 @@ fn a_reading_through_an_assist_is_of_the_motors_torque() {
         file: ColumnFile::default(),
     };
     let cases = study.cases();
-    assert_eq!(cases.len(), 5 * 3 * 8);
+    assert_eq!(cases.len(), 6 * 3 * 8);
     for case in &cases {
         let scenario = study.scenario(case).unwrap();
         assert_eq!(scenario.seed(), scenario.seed().clamp(1, 8));
@@ -133,7 +133,10 @@ fn a_reading_through_an_assist_is_of_the_motors_torque() {
     let rows = study.summarise(&cases, &readings);
     let of_motor: Vec<f64> = rows.iter().map(|row| (1000.0 * row.of_motor).round()).collect();
     let (plain, assisted) = ([0.0, 300.0, 600.0], [0.0, 200.0, 400.0]);
-    assert_eq!(of_motor, [plain, plain, plain, assisted, assisted].concat());
+    assert_eq!(
+        of_motor,
+        [plain, plain, plain, plain, assisted, assisted].concat()
+    );
     for row in rows {
         assert_eq!((row.drives, row.reported), (7, 0.5));
         // 0.1 to 0.7: the mean 0.4, the variance 0.04.

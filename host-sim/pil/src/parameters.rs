@@ -101,7 +101,7 @@ impl Product {
                 {
                     before = now;
                 }
-                // It gives a message its epoch behind the first frame.
+                // An ECU lets a sender prove a message from its second frame on.
                 Err((now, _)) if self.port.proves() && attempts == 1 => before = now,
                 Err((_, why)) => return Err(PilError::Failed(why)),
             }
@@ -150,7 +150,7 @@ impl Product {
             }
         }
         let why = format!(
-            "after {STATUSES} s the ECU still has set {} in use: its flash takes no other, or frames were lost",
+            "after {STATUSES} s the ECU still has set {} in use: its flash takes no other, it has keys (--keys), or frames were lost",
             before.sequence
         );
         Ok(Err((now, why)))

@@ -89,7 +89,7 @@ impl Port {
                     continue;
                 };
                 if let Some(prover) = &mut self.prover {
-                    // By chance: each state is keyed anew.
+                    // A number that was not given before: states begin by chance, and differ.
                     let questions = prover.hear(&frame, || RandomState::new().hash_one(0_u8) as u32);
                     self.send_as_they_are(&questions)?;
                 }

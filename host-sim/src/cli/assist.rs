@@ -49,7 +49,7 @@ pub(super) struct SensorArguments {
     /// lasts so many hours, 0.5 if none are given (some 5 minutes of a processor)
     #[arg(long, value_name = "HOURS", num_args = 0..=1, default_missing_value = "0.5")]
     hands: Option<f64>,
-    /// In its place: what the ECU reads of K_hg through the bar, of drivers whose K_hg is known (120 drives)
+    /// In its place: what the ECU reads of K_hg through the bar, of drivers whose K_hg is known (144 drives)
     #[arg(long, conflicts_with = "hands")]
     reading: bool,
     #[command(flatten)]

@@ -45,13 +45,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         options.estimate(what)?;
     }
     arguments.reading.choose(&mut options)?;
-    options.check()?;
     let mut logs = Vec::new();
     for path in &arguments.logs {
         let opened = arguments
             .reading
             .open(path, arguments.manual, &options.stretches, None);
         let (log, notes) = opened?;
+        options.check(&log)?;
         for note in notes {
             eprintln!("note: {}: {note}", path.display());
         }

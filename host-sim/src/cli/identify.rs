@@ -34,7 +34,8 @@ pub(super) struct Arguments {
     method: MethodArgument,
     /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms; by
     /// how much a column is late, s: t_h_late, t_d_late; the driver's own line, m: line_offset and line_bend, that in a left bend of
-    /// 300 m at 60 km/h; wheel_inertia and wheel_damping, N.m.s/rad; bar_stiffness, N.m/rad, where the angle is that of the column below the bar); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
+    /// 300 m at 60 km/h; of a torsion bar: wheel_inertia, kg.m2, wheel_damping, N.m.s/rad, and bar_stiffness, N.m/rad, where the angle is
+    /// the column's); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
     /// The column has a power assist that is not in guidance_torque_nm: it turns the wheel with the driver, so that the torques on the
@@ -45,8 +46,9 @@ pub(super) struct Arguments {
     /// t_nms=0.06..0.15; may be repeated
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
-    /// The torque was measured by a torsion bar below a steering wheel of this inertia (0.03 to 0.05 is usual): the torque of the
-    /// hands is made of it before the fit. It is known give or take 10 % (--fix wheel_inertia=J: exactly). Without it driver_torque_nm is taken as the torque of the hands
+    /// The torque was measured by a torsion bar below a steering wheel of this inertia, 0.001 to 0.2: the torque of the hands is made of it
+    /// before the fit, from 40 rows a second or more. Weigh the wheel: it counts as known to 10 % (--fix wheel_inertia=J: exactly), and one that
+    /// is much too small makes k_hg false. Without it driver_torque_nm is taken as the torque of the hands
     #[arg(long, value_name = "KG_M2")]
     wheel_inertia: Option<f64>,
     /// Take the lane signals as they are: no camera noise is estimated and removed
@@ -79,7 +81,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(inertia) = arguments.wheel_inertia {
         let [least, most] = WHEEL_INERTIA_KG_M2;
         in_range("--wheel-inertia", inertia, least..=most, "kg.m2")?;
-        options.wheel_inertia = Some(inertia);
+        if options.wheel_inertia.replace(inertia).is_some() {
+            return Err(BadInput::from(
+                "--wheel-inertia and --fix wheel_inertia: once is allowed".to_owned(),
+            ));
+        }
     }
     arguments.recording.reading.choose(&mut options)?;
     options.lane_noise = !arguments.no_lane_smoothing;

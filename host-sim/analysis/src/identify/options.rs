@@ -2,6 +2,7 @@
 
 use haptic_log::near::did_you_mean;
 
+use super::log::DriveLog;
 use super::noise_model::BEND_RAD_S;
 use super::signals::Muscle;
 
@@ -93,7 +94,9 @@ impl Default for Options {
 }
 
 /// Inertia that a steering wheel may have, kg.m2.
-pub const WHEEL_INERTIA_KG_M2: [f64; 2] = [0.0, 0.2];
+pub const WHEEL_INERTIA_KG_M2: [f64; 2] = [0.001, 0.2];
+/// Rows that are farther apart do not tell a wheel's acceleration, s.
+const WHEEL_ROW_S: f64 = 0.025;
 /// Damping of a wheel where nobody says more, N.m.s/rad, and its standard deviation: that of its bearings is 0 to 0.05.
 const WHEEL_DAMPING_NMS_PER_RAD: f64 = 0.025;
 
@@ -117,7 +120,14 @@ const FIXABLE: [(&str, f64, f64); 18] = [
     ("line_bend", -1.5, 1.5),
     ("wheel_inertia", WHEEL_INERTIA_KG_M2[0], WHEEL_INERTIA_KG_M2[1]),
     ("wheel_damping", 0.0, 0.5),
-    ("bar_stiffness", 20.0, 1000.0),
+    ("bar_stiffness", 5.0, 1000.0),
+];
+
+/// Units of what may be known in another one.
+const UNITS: [(&str, &str); 3] = [
+    ("wheel_inertia", " kg.m2"),
+    ("wheel_damping", " N.m.s/rad"),
+    ("bar_stiffness", " N.m/rad"),
 ];
 
 /// Names that are known unless they are to be estimated, with the range in which they are then searched.
@@ -187,8 +197,12 @@ impl Options {
             .parse()
             .map_err(|_| FixError(format!("--fix {name}: {text:?} is not a number")))?;
         if !(low..=high).contains(&value) {
+            let unit = UNITS
+                .iter()
+                .find(|(n, _)| *n == name)
+                .map_or("", |(_, unit)| unit);
             return Err(FixError(format!(
-                "--fix {name}: {} is outside {low} to {high}",
+                "--fix {name}: {} is outside {low} to {high}{unit}",
                 text.trim()
             )));
         }
@@ -282,11 +296,18 @@ impl Options {
     }
 
     /// Whether what is given can all be true for the noise model, in which gain_i = (K_d + K_nms)*a_i: K_d and one
-    /// a_i with its gain say each other, and so do two a_i without K_d.
+    /// a_i with its gain say each other, and so do two a_i without K_d. A wheel above a bar takes a log whose rows are near enough.
     ///
     /// # Errors
     /// What contradicts what, or could.
-    pub fn check(&self) -> Result<(), FixError> {
+    pub fn check(&self, log: &DriveLog) -> Result<(), FixError> {
+        if self.wheel_inertia.is_some() && log.dt_s > 1.01 * WHEEL_ROW_S {
+            return Err(FixError(format!(
+                "--wheel-inertia: the log has {:.0} rows a second, {:.0} are wanted, for the wheel's acceleration is made of them",
+                1.0 / log.dt_s,
+                1.0 / WHEEL_ROW_S
+            )));
+        }
         let of_wheel = [
             ("wheel_damping", self.wheel_damping),
             ("bar_stiffness", self.bar_stiffness),
@@ -410,12 +431,25 @@ mod tests {
             (&["a_1=0.1", "a_3=3.7", "k_d=3"], None),
             (&["a_1=0.1", "gain_1=0.4"], None),
             (&["a_1=0.1", "gain_2=0.4", "k_d=3"], None),
+            (
+                &["wheel_damping=0.05"],
+                Some("--wheel-inertia is wanted beside it"),
+            ),
+            (
+                &["bar_stiffness=143"],
+                Some("--wheel-inertia is wanted beside it"),
+            ),
+            (&["wheel_inertia=0.04"], Some("25 rows a second, 40 are wanted")),
         ] {
             let mut o = Options::default();
             for fix in fixes {
                 o.fix(fix).unwrap();
             }
-            match (o.check(), says) {
+            let slow = DriveLog {
+                dt_s: 0.04,
+                ..DriveLog::default()
+            };
+            match (o.check(&slow), says) {
                 (Ok(()), None) => {}
                 (Err(e), Some(says)) => assert!(e.to_string().contains(says), "{e}"),
                 (got, _) => panic!("{fixes:?}: {got:?}"),

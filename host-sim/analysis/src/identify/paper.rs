@@ -50,6 +50,16 @@ const TOLERANCE: f64 = 1e-4;
 /// # Errors
 /// A fixed `gain_i`, which is no parameter of this method; a fixed value outside table 4.
 pub fn identify(log: &DriveLog, options: &Options) -> Result<Identification, FixError> {
+    if options
+        .wheel_inertia
+        .or(options.wheel_damping)
+        .or(options.bar_stiffness)
+        .is_some()
+    {
+        return Err(FixError(
+            "the paper's method knows no wheel above a torsion bar: --method noise-model".to_owned(),
+        ));
+    }
     if let Some(i) = options.gain.iter().position(Option::is_some) {
         return Err(FixError(format!(
             "gain_{n} is no parameter of the paper's method: fix a_{n} and k_d instead",

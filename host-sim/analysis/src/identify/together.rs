@@ -140,6 +140,7 @@ impl Prepared {
             l
         }));
         sum.recorded_s += more.recorded_s;
+        sum.recorded_rows += more.recorded_rows;
         sum.used_s += more.used_s;
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A bar measures what passes through it: `T_hand = T_bar + J_w phi'' + B_w phi'`, with J_w and B_w inertia and damping of the wheel
 //! above it. Rate and acceleration are those of a polynomial of fourth order through the angle of 0.05 s before and after each row
-//! (Savitzky and Golay, 1964), so nothing is late. The wheel's own friction is left out: from 0.02 N.m on nothing is identified.
+//! (Savitzky and Golay, 1964), so nothing is late. The wheel's own friction is left out: 0.1 N.m hide the driver.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -26,20 +26,23 @@ pub enum Column {
     Rigid,
     /// The bar, without friction or assist.
     Smooth,
-    /// The bar with the file's friction, without assist.
-    Friction,
+    /// The bar with the file's friction of the wheel alone.
+    Wheel,
+    /// The bar with the file's friction of the column alone.
+    Below,
     /// The bar with the file's assist, without friction.
     Assist,
-    /// The bar with both.
+    /// The bar with both frictions and the assist.
     Both,
 }
 
 impl Column {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Rigid,
         Self::Smooth,
-        Self::Friction,
+        Self::Wheel,
+        Self::Below,
         Self::Assist,
         Self::Both,
     ];
@@ -49,9 +52,10 @@ impl Column {
         match self {
             Self::Rigid => "the paper's column",
             Self::Smooth => "bar, no friction, no assist",
-            Self::Friction => "bar and friction",
+            Self::Wheel => "bar, friction of the wheel",
+            Self::Below => "bar, friction of the column",
             Self::Assist => "bar and assist",
-            Self::Both => "bar, friction and assist",
+            Self::Both => "bar, both frictions and assist",
         }
     }
 }
@@ -134,7 +138,20 @@ impl Study {
         let curve = || self.file.one_curve().1;
         let (column, curve) = match case.column {
             Column::Rigid | Column::Smooth => (smooth, none),
-            Column::Friction => (column, none),
+            Column::Wheel => (
+                ColumnParameters {
+                    upper_friction_nm: column.upper_friction_nm,
+                    ..smooth
+                },
+                none,
+            ),
+            Column::Below => (
+                ColumnParameters {
+                    lower_friction_nm: column.lower_friction_nm,
+                    ..smooth
+                },
+                none,
+            ),
             Column::Assist => (smooth, curve()),
             Column::Both => (column, curve()),
         };

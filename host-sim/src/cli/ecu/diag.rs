@@ -68,8 +68,8 @@ struct Write {
         conflicts_with_all = ["bench_key", "keys"]
     )]
     key: Option<PathBuf>,
-    /// In its place: all keys of the ECU, of `cargo xtask keys`, so that the speeds of zero that are sent where nobody else sends any are
-    /// believed by an ECU with keys
+    /// In its place: all keys of the ECU, of `cargo xtask keys`. An ECU with keys takes parameters at standstill only if the speeds are proven,
+    /// which this command sends where nobody else does
     #[arg(long, value_name = "keys.toml", conflicts_with = "bench_key")]
     keys: Option<PathBuf>,
     /// The key of images for the bench, which everybody knows
@@ -413,6 +413,7 @@ mod tests {
             let write = Write {
                 values: vec![],
                 key: Some(path.clone()),
+                keys: None,
                 bench_key: false,
                 bus: Bus {
                     can: String::new(),

@@ -6,46 +6,71 @@ use haptic_pil::diagnosis::Key;
 use haptic_secoc::Keys;
 use haptic_secoc::fresh::Algorithm;
 use haptic_sim::input::InputError;
-use serde::Deserialize;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    mac: Mac,
-    camera: String,
-    host: String,
-    access: String,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Mac {
-    Siphash,
-    AesCmac,
-}
 
 /// The keys of camera and host, and that of security access.
 pub(super) fn load(path: &Path) -> Result<(Keys, Key), InputError> {
     let wrong = |what: String| InputError::new(path.display().to_string(), what);
     let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
     // What the parser says would quote a key.
-    let file: File = toml::from_str(&text).map_err(|_| {
-        let what = "not a file of keys: mac (siphash or aes-cmac), camera, host and access, and nothing else";
-        wrong(what.into())
-    })?;
-    let key = |name: &str, text: &str| {
-        let number = u128::from_str_radix(text, 16).ok().filter(|_| text.len() == 32);
+    let file: toml::Table = text
+        .parse()
+        .map_err(|_| wrong("not TOML: mac, camera, host and access are wanted".into()))?;
+    let field = |name: &str| match file.get(name) {
+        Some(toml::Value::String(text)) => Ok(text),
+        _ => Err(wrong(format!("{name} is missing, or no text in quotation marks"))),
+    };
+    let key = |name: &str| -> Result<Key, InputError> {
+        let digits = field(name)?;
+        let is_key = digits.len() == 32 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+        let number = u128::from_str_radix(digits, 16).ok().filter(|_| is_key);
         let number =
             number.ok_or_else(|| wrong(format!("{name}: a key has 16 bytes, 32 hexadecimal digits")))?;
-        Ok::<_, InputError>(number.to_be_bytes())
+        Ok(number.to_be_bytes())
     };
     let keys = Keys {
-        algorithm: match file.mac {
-            Mac::Siphash => Algorithm::SipHash,
-            Mac::AesCmac => Algorithm::AesCmac,
+        algorithm: match field("mac")?.as_str() {
+            "siphash" => Algorithm::SipHash,
+            "aes-cmac" => Algorithm::AesCmac,
+            _ => return Err(wrong("mac: siphash or aes-cmac is wanted".into())),
         },
-        camera: key("camera", &file.camera)?,
-        host: key("host", &file.host)?,
+        camera: key("camera")?,
+        host: key("host")?,
     };
-    Ok((keys, key("access", &file.access)?))
+    Ok((keys, key("access")?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The errors name the field, and never quote a key.
+    #[test]
+    fn a_file_of_keys_is_read_or_says_what_is_wrong() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("keys.toml");
+        let bench = Keys::bench(Algorithm::AesCmac);
+        let text = |key: &[u8]| key.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+        let [camera, host] = [text(&bench.camera), text(&bench.host)];
+        let whole =
+            format!("mac = \"aes-cmac\"\ncamera = \"{camera}\"\nhost = \"{host}\"\naccess = \"{host}\"\n");
+        std::fs::write(&file, &whole).unwrap();
+        let (keys, access) = load(&file).unwrap();
+        assert!(keys == bench && access == bench.host);
+        for (spoiled, says) in [
+            (whole.replace("host", "hots"), "host is missing"),
+            (whole.replace("aes-cmac", "md5"), "siphash or aes-cmac"),
+            (whole.replace(&camera[..1], "+"), "32 hexadecimal digits"),
+            (whole.replace("access = ", "access "), "not TOML"),
+        ] {
+            std::fs::write(&file, &spoiled).unwrap();
+            let Err(refused) = load(&file) else {
+                panic!("{says}")
+            };
+            let refused = refused.to_string();
+            assert!(
+                refused.contains(says) && !refused.contains(&host[..8]),
+                "{refused}"
+            );
+        }
+    }
 }

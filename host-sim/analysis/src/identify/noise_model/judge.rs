@@ -175,24 +175,17 @@ impl Problem<'_> {
         found.notes.extend(hidden_gain_2(&mut found.parameters.gain_2));
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
-            Some(inertia) => {
-                let leeway = |is_known, text| if is_known { String::new() } else { text };
-                format!(
-                    "driver_torque_nm is that of a torsion bar below a wheel without friction, of {inertia} kg.m2{} and {} N.m.s/rad{}: the \
-                     torque of the hands was made of it, in 20 rows a second at most",
-                    leeway(
-                        options.wheel_inertia_known,
-                        format!(" (give or take {} %)", 100.0 * WHEEL_SHARE)
-                    ),
-                    options.wheel_damping(),
-                    leeway(
-                        options.wheel_damping.is_some(),
-                        format!(" (give or take {}), which the errors hold", options.wheel_damping())
-                    ),
-                )
-            }
-            None => "driver_torque_nm is the torque of the hands: no wheel turns between them and the sensor".to_owned(),
+            Some(inertia) => of_wheel(inertia, options),
+            None => "driver_torque_nm is the torque of the hands: no wheel turns between them and the sensor"
+                .to_owned(),
         });
+        if options.assisted || options.wheel_inertia.is_some() {
+            found.assumed.push(
+                "k_hg is the driver's answer to guidance_torque_nm: beside a power assist that is less than the answer to what comes up to the \
+                 hands, by 1 + the slope of the assist"
+                    .to_owned(),
+            );
+        }
         if options.assisted {
             found.assumed.push(
                 "driver_torque_nm is recorded at no less than its value: beside a power assist the torques on the column do not tell"
@@ -230,7 +223,8 @@ impl Problem<'_> {
         let columns = found.preflight.iter().flat_map(|p| &p.columns);
         let torque = columns.filter(|(name, _)| *name == "driver_torque_nm");
         let bridged: usize = torque.map(|(_, f)| f.missing + f.spikes).sum();
-        bridged as f64 / self.log.len().max(1) as f64
+        let rows = found.preflight.as_ref().map_or(0, |p| p.recorded_rows);
+        bridged as f64 / rows.max(1) as f64
     }
 
     /// By how much the vehicle is farther to the left after a change than before it, m.
@@ -543,6 +537,29 @@ fn friction(balance: &Balance) -> Option<String> {
          wheel slides.",
         balance.seconds
     ))
+}
+
+/// What the torque of the hands was made of.
+fn of_wheel(inertia: f64, options: &Options) -> String {
+    let of = |is_known, leeway: String| {
+        if is_known {
+            String::new()
+        } else {
+            format!(" (give or take {leeway})")
+        }
+    };
+    let damping = options.wheel_damping();
+    format!(
+        "driver_torque_nm is that of a torsion bar below a wheel without friction, of {inertia} kg.m2{} and {damping} N.m.s/rad{}; {}. The torque of the \
+         hands was made of these; with an inertia that is much too small k_hg is false, and nothing in the log shows it",
+        of(options.wheel_inertia_known, format!("{} %", 100.0 * WHEEL_SHARE)),
+        of(options.wheel_damping.is_some(), damping.to_string()),
+        match options.bar_stiffness {
+            Some(stiffness) =>
+                format!("wheel_angle_rad is that of the column below a bar of {stiffness} N.m/rad"),
+            None => "wheel_angle_rad is that of the wheel".to_owned(),
+        }
+    )
 }
 
 #[cfg(test)]

@@ -61,7 +61,12 @@ impl Problem<'_> {
             // One that the record does not tell well is held by what is assumed, and must be surely beyond.
             let sure = if error < TOLD_S { error } else { SURELY * error };
             if a.place == T_NMS && beyond > ROUNDING_S.max(sure) {
-                let (cause, cure) = if drawn < low {
+                let (cause, cure) = if drawn < low && self.wheel.is_some() {
+                    (
+                        "the wheel above the bar has friction or another inertia, or the angle is that of the column below the bar",
+                        "--fix bar_stiffness=K where it is the column's; friction of the wheel has no cure",
+                    )
+                } else if drawn < low {
                     (
                         "the steering wheel turns between the hands and the sensor (a torsion bar below the wheel), or a \
                          torque is late",

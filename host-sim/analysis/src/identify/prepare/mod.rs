@@ -42,8 +42,10 @@ pub struct Preflight {
     pub left_out: Vec<LeftOut>,
     /// Pauses up to so long were bridged, s.
     pub bridge_s: f64,
-    /// Seconds of the record.
+    /// Seconds of the record, and its rows.
     pub recorded_s: f64,
+    #[serde(skip)]
+    pub(crate) recorded_rows: usize,
     /// Seconds that the estimate rests on.
     pub used_s: f64,
 }
@@ -126,6 +128,11 @@ impl Prepared {
         if every < 2 {
             return;
         }
+        let (rows, rate_hz) = (self.log.len(), 1.0 / self.log.dt_s);
+        let found = format!("{rows} at {rate_hz:.0} Hz");
+        self.preflight
+            .reading
+            .push(["rows".to_owned(), found, format!("one of {every} used")]);
         self.log.keep_every(every);
         let doubts = self.lane_doubts.iter_mut().map(|doubt| &mut doubt.signal);
         let wheel = self
@@ -145,7 +152,17 @@ impl Prepared {
 pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     let dt = log.dt_s;
     let columns = log.signals();
-    let examined = [0, 1, 2, 3, 4].map(|c| faults::examine(columns[c], dt, LEAST[c], c < 2));
+    let examine = |c: usize, signal: &[f64]| faults::examine(signal, dt, LEAST[c], c < 2);
+    let mut angle = examine(2, columns[2]);
+    let (hands_nm, wheel) = hands(&mut angle.signal, columns[4], dt, options);
+    let examined = [
+        examine(0, columns[0]),
+        examine(1, columns[1]),
+        angle,
+        examine(3, columns[3]),
+        // A bar's torque swings with the wheel, faster than hands: what is out of line is seen in the hands' torque.
+        examine(4, &hands_nm),
+    ];
     let lane = [0, 1].map(|c| {
         options
             .lane_noise
@@ -174,6 +191,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         reading: log.findings.clone(),
         bridge_s: options.bridge_s,
         recorded_s: log.len() as f64 * dt,
+        recorded_rows: log.len(),
         ..Preflight::default()
     };
     let [y, theta] = lane;
@@ -189,7 +207,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         lane_doubts.extend(s.doubts.into_iter().map(doubt));
         s.signal
     };
-    let mut clean = DriveLog {
+    let clean = DriveLog {
         start_s: log.start_s,
         dt_s: dt,
         e_y_m: take(y, e_y.signal, 0),
@@ -202,19 +220,6 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         speeds_m_per_s: log.speeds_m_per_s,
         findings: Vec::new(),
     };
-    let wheel = options.wheel_inertia.map(|inertia| {
-        if let Some(stiffness) = options.bar_stiffness {
-            let bar = clean.driver_torque_nm.iter();
-            clean
-                .wheel_angle_rad
-                .iter_mut()
-                .zip(bar)
-                .for_each(|(phi, bar)| *phi += bar / stiffness);
-        }
-        let wheel = WheelMotion::of(&clean.wheel_angle_rad, dt);
-        wheel.add_to(&mut clean.driver_torque_nm, inertia, options.wheel_damping());
-        wheel
-    });
     preflight.lane_noise = lane_noise;
     let (stretches, left_out) = stretches::stretches(log, &clean, &bad, lane_noise, options);
     preflight.left_out = left_out;
@@ -227,9 +232,33 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         preflight,
     };
     if prepared.wheel.is_some() {
-        prepared.keep_every((WHEEL_ROWS_S / dt).round() as usize);
+        // Rows of 0.05 s do not make 0.055 of it.
+        prepared.keep_every((WHEEL_ROWS_S / dt + 1e-6) as usize);
     }
     prepared
+}
+
+/// The torque of the hands, N.m, from that of a bar above which a wheel turns, if there is one, and how the wheel moves. The angle becomes that of the
+/// wheel.
+fn hands(
+    angle_rad: &mut [f64],
+    torque_nm: &[f64],
+    dt: f64,
+    options: &Options,
+) -> (Vec<f64>, Option<WheelMotion>) {
+    let mut hands_nm = torque_nm.to_vec();
+    let Some(inertia) = options.wheel_inertia else {
+        return (hands_nm, None);
+    };
+    if let Some(stiffness) = options.bar_stiffness {
+        let bar_nm = faults::examine(torque_nm, dt, LEAST[4], false).signal;
+        for (phi, bar) in angle_rad.iter_mut().zip(bar_nm) {
+            *phi += bar / stiffness;
+        }
+    }
+    let wheel = WheelMotion::of(angle_rad, dt);
+    wheel.add_to(&mut hands_nm, inertia, options.wheel_damping());
+    (hands_nm, Some(wheel))
 }
 
 /// e_y (lane 0) or e_theta (1) without the camera's noise.
