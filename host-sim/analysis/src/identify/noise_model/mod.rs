@@ -202,7 +202,7 @@ struct Problem<'a> {
     /// line.
     assumed: Vec<Assumed>,
     signals: Signals,
-    /// Of the wheel above a torsion bar, where there is one.
+    /// The motion of the wheel above a torsion bar, where there is one.
     wheel: Option<&'a WheelMotion>,
     bounds: Vec<Bounds>,
     /// Rows that the loss is taken over.

@@ -117,7 +117,7 @@ pub(crate) struct Prepared {
     pub stretches: Vec<Range<usize>>,
     /// What is not known of the lane signals for the whole record.
     pub lane_doubts: Vec<LaneDoubt>,
-    /// Of the wheel above a torsion bar, where there is one.
+    /// The motion of the wheel above a torsion bar, where there is one.
     pub wheel: Option<WheelMotion>,
     pub preflight: Preflight,
 }
