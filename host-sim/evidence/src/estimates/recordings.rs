@@ -160,7 +160,7 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
                     lower_friction_nm: 0.3,
                     ..ColumnParameters::default()
                 };
-                let guidance = scenario.guidance().clone().told_of(&column);
+                let guidance = scenario.guidance().told_of(&column);
                 scenario = scenario.to_builder().column(column).guidance(guidance).build()?;
             }
             Ok::<_, StudyError>(simulation::simulate(&scenario).trace)

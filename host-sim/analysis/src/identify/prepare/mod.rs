@@ -168,17 +168,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
             .lane_noise
             .then(|| smoothed_lane(&examined[c], c, &examined[2].signal, dt, options))
     });
-    let mut bad: Vec<Vec<bool>> = examined.iter().map(|e| e.bad.clone()).collect();
-    for (c, s) in lane.iter().enumerate() {
-        if let Some(s) = s {
-            for (b, e) in bad[c].iter_mut().zip(&s.error_sd) {
-                *b &= e * USUAL_GAINS[c] > LARGEST_BRIDGED_NM;
-            }
-            for (b, &burst) in bad[c].iter_mut().zip(&s.bursts) {
-                *b |= burst;
-            }
-        }
-    }
+    let bad = bad_rows(&examined, &lane);
     let mut lane_noise = [LaneNoise::default(); 2];
     let [e_y, e_theta, phi, t_h, t_d] = examined;
     let named = [&e_y, &e_theta, &phi, &t_h, &t_d];
@@ -236,6 +226,22 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         prepared.keep_every((WHEEL_ROWS_S / dt + 1e-6) as usize);
     }
     prepared
+}
+
+/// By column, the rows that are not to be used, unless others make up for them.
+fn bad_rows(examined: &[faults::Examined; 5], lane: &[Option<Smoothed>; 2]) -> Vec<Vec<bool>> {
+    let mut bad: Vec<Vec<bool>> = examined.iter().map(|e| e.bad.clone()).collect();
+    for (c, s) in lane.iter().enumerate() {
+        if let Some(s) = s {
+            for (b, e) in bad[c].iter_mut().zip(&s.error_sd) {
+                *b &= e * USUAL_GAINS[c] > LARGEST_BRIDGED_NM;
+            }
+            for (b, &burst) in bad[c].iter_mut().zip(&s.bursts) {
+                *b |= burst;
+            }
+        }
+    }
+    bad
 }
 
 /// The torque of the hands, N.m, from that of a bar above which a wheel turns, if there is one, and how the wheel moves. The angle becomes that of the
