@@ -100,6 +100,24 @@ fn what_differs_by_a_constant_is_learnt() {
     }
 }
 
+/// A wheel that stands askew by 0.03 rad/s is learnt in 90 s, up to 0.025 rad/s and no further: of a rate `r` that it then stands
+/// for, `r - 0.025` sums up, and it is too much beyond 0.03 and a quarter of `r`. So from 0.0733 rad/s on.
+#[test]
+fn no_more_than_25_mrad_a_second_is_learnt() {
+    for sign in [1.0, -1.0] {
+        let mut learnt = in_bend(0.0);
+        learnt.turn(0.03 * sign);
+        (learnt.yaw_rate, learnt.driver) = (Some(0.0), Some(0.0));
+        assert_eq!(learnt.run(90_000).command.faults, FaultSet::NONE);
+        for (rate, is_declared) in [(0.071, false), (0.077, true)] {
+            let mut rig = learnt.clone();
+            rig.turn(rate * sign);
+            rig.yaw_rate = Some(0.0);
+            assert_eq!(declared(&mut rig).is_some(), is_declared, "{rate}");
+        }
+    }
+}
+
 /// Impossible for 0.1 s: left out; for longer: not believed. A step of 0.15 rad/s, or 12 m/s2 to the side: 0.72 rad/s.
 #[test]
 fn what_no_vehicle_has_is_left_out_and_then_not_believed() {
