@@ -6,6 +6,7 @@ mod coast;
 mod column;
 mod dbc;
 mod dbc_numbers;
+mod doubted;
 mod download;
 mod e2e;
 mod ecu;
