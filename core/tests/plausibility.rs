@@ -520,26 +520,41 @@ fn where_the_line_pointed_earlier_is_between_two_kept_directions() {
     assert_eq!(motion_history.line_direction(now, now, Micros::from_ms(1)), None);
 }
 
+/// When a line is declared that has drifted aside for 100 s and then slides, m/s, while yaw rate, or wheel and speed, say that the
+/// vehicle goes straight: s after it began to slide.
+fn slide_found_s(yaw_rate: Option<TurningRate>, drift: f64, slide: f64) -> f64 {
+    let checks = Config::PAPER.plausibility;
+    let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
+    checks.motion(&mut state, Speed::from_m_per_s(30.0), yaw_rate);
+    let mut e_y = 0.0;
+    let declared = (0..110_000).step_by(10).find(|ms| {
+        e_y += 0.01 * if *ms < 100_000 { drift } else { slide };
+        // It stays within +-90 m in the end; the ECU sees less.
+        let sample = LaneSample {
+            at: Instant::from_us(0).after(Micros::from_ms(*ms)),
+            ..lane(e_y, 0.0)
+        };
+        checks.lane(&mut state, &mut motion_history, sample.at, sample) != LaneMotion::Consistent
+    });
+    f64::from(declared.unwrap()) * 1e-3 - 100.0
+}
+
 /// A drift of 0.3 m/s, of which the yaw rate says nothing: 0.15 m/s are learnt. A line that then slides by 1.2 m/s goes 1.05 m/s
 /// beyond that, with a memory of 1 s: from 0.15 to 0.8 m in ln(0.9/0.25) = 1.28 s.
 #[test]
 fn no_more_than_a_drift_of_15_cm_a_second_is_learnt() {
-    let checks = Config::PAPER.plausibility;
     for side in [1.0, -1.0] {
-        let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
-        checks.motion(&mut state, Speed::from_m_per_s(30.0), Some(TurningRate::ZERO));
-        let mut e_y = 0.0;
-        let declared = (0..110_000).step_by(10).find(|ms| {
-            let since_s = f64::from(*ms) * 1e-3 - 100.0;
-            e_y += 0.01 * side * if since_s < 0.0 { 0.3 } else { 1.2 };
-            // It stays within +-60 m in the end; the ECU sees less.
-            let sample = LaneSample {
-                at: Instant::from_us(0).after(Micros::from_ms(*ms)),
-                ..lane(e_y, 0.0)
-            };
-            checks.lane(&mut state, &mut motion_history, sample.at, sample) != LaneMotion::Consistent
-        });
-        let since_s = f64::from(declared.unwrap()) * 1e-3 - 100.0;
+        let since_s = slide_found_s(Some(TurningRate::ZERO), 0.3 * side, 1.2 * side);
         assert!((since_s - 1.28).abs() < 0.03, "{since_s} s");
+    }
+}
+
+/// Without a yaw rate 0.5 m/s of a drift of 0.8 m/s are learnt. A slide by 3 m/s goes 2.5 m/s beyond that: from 0.3 to 2 m in
+/// ln(2.2/0.5) = 1.48 s.
+#[test]
+fn without_a_yaw_rate_half_a_metre_a_second_is_learnt() {
+    for side in [1.0, -1.0] {
+        let since_s = slide_found_s(None, 0.8 * side, 3.0 * side);
+        assert!((since_s - 1.48).abs() < 0.03, "{since_s} s");
     }
 }
