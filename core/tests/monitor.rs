@@ -697,7 +697,7 @@ fn behind_a_bar_what_lasts_has_to_be_yielded_to() {
             (6_000, true, None),
         ] {
             let mut bench = Bench::at(5.0, sign * 16_384);
-            bench.monitor = behind_a_bar();
+            bench.monitor = behind_a_bar(100.0);
             assert!(bench.show(None, Some(column(0)), guidance(sign * 16_384, ACTIVE), 1000));
             let found = (1..1000).find(|ms| {
                 let side = if swings && ms / 90 % 2 == 0 { sign } else { -sign };
@@ -712,6 +712,32 @@ fn behind_a_bar_what_lasts_has_to_be_yielded_to() {
                 ),
                 None => assert_eq!(found, None, "{bar_mnm} {swings}"),
             }
+        }
+    }
+}
+
+/// A torque has to be yielded to when it has lasted for one window, or for almost two where it began with one. A window is two lags of
+/// the observer and eight more, 0.25 s at 40 rad/s; or two and what 5 N.m take at 64 N.m/s, 0.088 s at 200 rad/s.
+#[test]
+fn behind_a_bar_the_window_is_that_of_its_observer() {
+    for (rad_per_s, window_ms) in [(40.0, 250_u32), (200.0, 88)] {
+        for sign in [1, -1] {
+            let mut bench = Bench::at(5.0, sign * 16_384);
+            bench.monitor = behind_a_bar(rad_per_s);
+            let shown = |bench: &mut Bench, bar_mnm: i64| {
+                let lane = lane(sign * 32_768, sign * 32_768, 0);
+                let column = column(-sign * counts(bar_mnm).0);
+                bench.show(Some(lane), Some(column), guidance(sign * 16_384, ACTIVE), 2000)
+            };
+            let lasted = (0..=window_ms).step_by(2).map(|begins_ms| {
+                let mut bench = bench;
+                assert!((0..=begins_ms).step_by(2).all(|_| shown(&mut bench, 0)));
+                2 * (0..1000).take_while(|_| shown(&mut bench, 6_000)).count() as u32
+            });
+            let lasted: Vec<u32> = lasted.collect();
+            let (least, most) = (lasted.iter().min().unwrap(), lasted.iter().max().unwrap());
+            assert!(least.abs_diff(window_ms) <= 4, "{rad_per_s}: {least} ms");
+            assert!(most.abs_diff(2 * window_ms) <= 6, "{rad_per_s}: {most} ms");
         }
     }
 }
@@ -733,7 +759,7 @@ fn behind_a_bar_a_torque_may_fall_as_fast_as_it_yields() {
         ] {
             let mut bench = Bench::at(5.0, sign * 16_384);
             if is_bar {
-                bench.monitor = behind_a_bar();
+                bench.monitor = behind_a_bar(100.0);
             }
             let lane = lane(sign * 32_768, sign * 32_768, 0);
             let shown = column(sign * counts(bar_mnm).0);
@@ -745,9 +771,10 @@ fn behind_a_bar_a_torque_may_fall_as_fast_as_it_yields() {
     }
 }
 
-fn behind_a_bar() -> Monitor {
+fn behind_a_bar(observer_bandwidth_rad_per_s: f64) -> Monitor {
     let params = Params {
         torque_sensor: 1.0,
+        observer_bandwidth_rad_per_s,
         ..Params::PAPER
     };
     Setup::new(&params).unwrap().monitor
