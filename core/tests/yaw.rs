@@ -118,6 +118,19 @@ fn no_more_than_25_mrad_a_second_is_learnt() {
     }
 }
 
+/// Wheel and speed deny a rate up to 3 m/s2 aside, 0.18 rad/s at 60 km/h.
+#[test]
+fn what_is_wrong_in_a_bend_of_almost_3_m_per_s2_is_denied_too() {
+    for sign in [1.0, -1.0] {
+        for wrong in [0.07, 0.27] {
+            let mut rig = in_bend(0.17 * sign);
+            rig.yaw_rate = Some(wrong * sign);
+            let ms = declared(&mut rig);
+            assert!(ms.is_some_and(|ms| (100..=1500).contains(&ms)), "{wrong}: {ms:?}");
+        }
+    }
+}
+
 /// Impossible for 0.1 s: left out; for longer: not believed. A step of 0.15 rad/s, or 12 m/s2 to the side: 0.72 rad/s.
 #[test]
 fn what_no_vehicle_has_is_left_out_and_then_not_believed() {
