@@ -15,6 +15,7 @@ use haptic_core::safety::modes::Mode;
 const LANE: usize = 0;
 const COLUMN: usize = 1;
 const VEHICLE: usize = 2;
+const REQUEST: usize = 3;
 /// What the slowest camera has, ms: 15 pictures a second.
 const SLOWEST_MS: f64 = 1000.0 / 15.0;
 
@@ -74,6 +75,31 @@ fn a_period_grows_at_once_and_falls_slowly() {
     let gaps = [&[50; 5][..], &[140]].concat();
     assert_eq!(waits(&gaps), expected(SLOWEST_MS));
     assert_eq!(waits(&[&gaps[..], &[30]].concat()), expected(30.0));
+}
+
+/// A column is waited for by three periods of 20 ms at most, the vehicle's own messages by three of 25 ms, however far apart they come.
+/// Those between are lost.
+#[test]
+fn slower_senders_are_waited_for_as_long_as_the_slowest() {
+    for (sender, fault, gap, wait_ms) in [
+        (COLUMN, Fault::ColumnTimeout, 16, 48),
+        (COLUMN, Fault::ColumnTimeout, 24, 60),
+        (VEHICLE, Fault::SpeedTimeout, 20, 60),
+        (VEHICLE, Fault::SpeedTimeout, 30, 75),
+        (REQUEST, Fault::RequestTimeout, 20, 60),
+        (REQUEST, Fault::RequestTimeout, 30, 75),
+    ] {
+        let mut rig = Rig::active_in_curve(1.0);
+        let mut since = 0;
+        for _ in 0..20 * gap {
+            rig.silent[sender] = !rig.ticks.is_multiple_of(gap);
+            since = if rig.silent[sender] { since + 1 } else { 0 };
+            assert!(!rig.tick().command.faults.contains(fault), "{fault:?} {gap}");
+        }
+        rig.silent[sender] = true;
+        let (ms, _) = rig.run_until(100, |step| step.command.faults.contains(fault));
+        assert_eq!(since + ms, wait_ms + 1, "{fault:?} {gap}");
+    }
 }
 
 #[test]
