@@ -97,13 +97,18 @@ fn k_hg_comes_through_a_bar_by_the_inertia_of_the_wheel() {
 }
 
 #[test]
-fn damping_and_stiffness_belong_to_a_wheel() {
-    for fixed in ["wheel_damping=0.05", "bar_stiffness=143"] {
-        let options = Options::given(false, &[fixed.to_owned()]).unwrap();
-        let refused = identify("bar", &drive(0.0, false), &options, Method::NoiseModel).unwrap_err();
-        assert!(
-            refused.to_string().contains("--wheel-inertia is wanted"),
-            "{refused}"
-        );
+fn what_tells_no_wheel_is_refused() {
+    let log = drive(0.0, false);
+    let told = Options::given(false, &["wheel_inertia=0.044".to_owned()]).unwrap();
+    let slow = DriveLog {
+        dt_s: 0.05,
+        ..log.clone()
+    };
+    for (log, method, says) in [
+        (&slow, Method::NoiseModel, "20 rows a second, 40 are wanted"),
+        (&log, Method::Paper, "knows no wheel"),
+    ] {
+        let refused = identify("bar", log, &told, method).unwrap_err().to_string();
+        assert!(refused.contains(says), "{refused}");
     }
 }

@@ -166,6 +166,27 @@ mod tests {
     use super::*;
     use haptic_sim::models::torsion_bar::{ColumnKind, ColumnParameters};
 
+    #[test]
+    fn a_reading_through_a_wheel_with_friction_is_doubted() {
+        for (kind, upper_friction_nm, is_doubted) in [
+            (ColumnKind::TorsionBar, 0.01, true),
+            (ColumnKind::TorsionBar, 0.0, false),
+            (
+                ColumnKind::Rigid,
+                ColumnParameters::default().upper_friction_nm,
+                false,
+            ),
+        ] {
+            let column = ColumnParameters {
+                kind,
+                upper_friction_nm,
+                ..ColumnParameters::default()
+            };
+            let scenario = Scenario::builder().column(column).build().unwrap();
+            assert_eq!(friction_note(&scenario).is_some(), is_doubted, "{column:?}");
+        }
+    }
+
     /// Each of the three sensors beside each of the three that the ECU may be told of: six of nine are told apart, and none by hand.
     #[test]
     fn a_sensor_that_the_ecu_takes_for_another_is_told() {

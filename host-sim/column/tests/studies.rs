@@ -130,7 +130,7 @@ fn a_reading_through_an_assist_is_of_the_motors_torque() {
     let readings: Vec<_> = (0..cases.len())
         .map(|k| (k % 8 > 0).then_some([0.1 * (k % 8) as f64, 0.5]))
         .collect();
-    let rows = study.summarise(&cases, &readings);
+    let rows = study.summarise(&cases, &readings).rows;
     let of_motor: Vec<f64> = rows.iter().map(|row| (1000.0 * row.of_motor).round()).collect();
     let (plain, assisted) = ([0.0, 300.0, 600.0], [0.0, 200.0, 400.0]);
     assert_eq!(

@@ -99,8 +99,8 @@ pub(super) fn sensors(arguments: &SensorArguments) -> Result<Outcome, BadInput> 
         let readings = progress::watched("drives", |watch| {
             arguments.threads.run(|| each(&cases, watch, drive))
         })??;
-        let rows = study.summarise(&cases, &readings);
-        return output.show(&reading_report(&rows), &rows, true);
+        let results = study.summarise(&cases, &readings);
+        return output.show(&reading_report(&results), &results, true);
     }
     let results = sensors::run(&file)?;
     output.show(&sensors_report(&results), &results, true)

@@ -96,7 +96,7 @@ impl Default for Options {
 /// Inertia that a steering wheel may have, kg.m2.
 pub const WHEEL_INERTIA_KG_M2: [f64; 2] = [0.001, 0.2];
 /// Rows that are farther apart do not tell a wheel's acceleration, s.
-const WHEEL_ROW_S: f64 = 0.025;
+const LONGEST_WHEEL_ROW_S: f64 = 0.025;
 /// Damping of a wheel where nobody says more, N.m.s/rad, and its standard deviation: that of its bearings is 0 to 0.05.
 const WHEEL_DAMPING_NMS_PER_RAD: f64 = 0.025;
 
@@ -123,7 +123,7 @@ const FIXABLE: [(&str, f64, f64); 18] = [
     ("bar_stiffness", 5.0, 1000.0),
 ];
 
-/// Units of what may be known in another one.
+/// Units of what people also have in other ones, such as a bar's stiffness in N.m/deg.
 const UNITS: [(&str, &str); 3] = [
     ("wheel_inertia", " kg.m2"),
     ("wheel_damping", " N.m.s/rad"),
@@ -301,11 +301,11 @@ impl Options {
     /// # Errors
     /// What contradicts what, or could.
     pub fn check(&self, log: &DriveLog) -> Result<(), FixError> {
-        if self.wheel_inertia.is_some() && log.dt_s > 1.01 * WHEEL_ROW_S {
+        if self.wheel_inertia.is_some() && log.dt_s > 1.01 * LONGEST_WHEEL_ROW_S {
             return Err(FixError(format!(
                 "--wheel-inertia: the log has {:.0} rows a second, {:.0} are wanted, for the wheel's acceleration is made of them",
                 1.0 / log.dt_s,
-                1.0 / WHEEL_ROW_S
+                1.0 / LONGEST_WHEEL_ROW_S
             )));
         }
         let of_wheel = [

@@ -1,7 +1,7 @@
 //! The torque of the hands from that of a torsion bar below the steering wheel.
 //!
 //! A bar measures what passes through it: `T_hand = T_bar + J_w phi'' + B_w phi'`, with J_w and B_w inertia and damping of the wheel
-//! above it. Rate and acceleration are those of a polynomial of fourth order through the angle of 0.05 s before and after each row
+//! above it. Rate and acceleration are those of a polynomial of fourth order through the angle of 0.05 s, and three rows at least, before and after each row
 //! (Savitzky and Golay, 1964), so nothing is late. The wheel's own friction is left out: 0.1 N.m hide the driver.
 
 use nalgebra::{DMatrix, DVector};
@@ -12,7 +12,7 @@ const HALF_S: f64 = 0.05;
 /// Coefficients of the polynomial.
 const COEFFICIENTS: usize = 5;
 /// Rows of the fit are so far apart, s: those within the polynomial's span have the same error, which no remnant has.
-pub(super) const WHEEL_ROWS_S: f64 = 0.05;
+pub(super) const FIT_ROW_S: f64 = 0.05;
 
 /// How the wheel above a bar moves, in each row.
 #[derive(Debug, Clone)]

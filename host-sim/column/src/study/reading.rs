@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::ColumnFile;
 
-/// What reads.
+/// K_hg of the drivers.
 pub const K_HG: [f64; 3] = [0.0, 0.3, 0.6];
 /// Draws of the remnant, from seed 1 on, and its standard deviation, N.m.
 pub const SEEDS: u64 = 8;
@@ -85,6 +85,13 @@ pub struct Row {
     pub reported: f64,
     /// Drives with a reading.
     pub drives: usize,
+}
+
+/// What is read of all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// A row for each K_hg on each column.
+    pub rows: Vec<Row>,
 }
 
 /// The study of a column.
@@ -169,8 +176,8 @@ impl Study {
         file.with(builder).guidance(told).build()
     }
 
-    /// A row for each K_hg on each column. A reading is the last of its drive, value and standard deviation; none where there was none.
-    pub fn summarise(&self, cases: &[Case], readings: &[Option<[f64; 2]>]) -> Vec<Row> {
+    /// What the drives show. A reading is the last of its drive, value and standard deviation; none where there was none.
+    pub fn summarise(&self, cases: &[Case], readings: &[Option<[f64; 2]>]) -> Results {
         let slope = self.file.one_curve().1.assist().slope(0.0, SPEED_KMH / 3.6);
         let row = |column, k_hg| {
             let here = cases
@@ -192,6 +199,8 @@ impl Study {
             }
         };
         let of = |column| K_HG.into_iter().map(move |k_hg| row(column, k_hg));
-        Column::ALL.into_iter().flat_map(of).collect()
+        Results {
+            rows: Column::ALL.into_iter().flat_map(of).collect(),
+        }
     }
 }

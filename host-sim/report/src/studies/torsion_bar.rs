@@ -187,7 +187,7 @@ fn ecu_table(rows: &[ecu::Row]) -> Table {
 }
 
 /// The document of what the ECU reads of K_hg.
-pub fn reading_report(rows: &[reading::Row]) -> Report {
+pub fn reading_report(results: &reading::Results) -> Report {
     let row = |row: &reading::Row| {
         [
             ("The arm acts on", Cell::text(row.column.name())),
@@ -203,10 +203,10 @@ pub fn reading_report(rows: &[reading::Row]) -> Report {
          reports. Beside an assist the ECU reads an arm's answer to the motor's torque, of which 1/(1 + slope) comes up to the hands.";
     let summary = format!(
         "The paper's driver on paper-course at 60 km/h, with the probe and a remnant of 0.1 N.m, {} seeds of each. The ECU is told right of its \
-         bar.",
+         bar, and has the angle of the column.",
         reading::SEEDS
     );
-    let table = Block::Table(Table::of_rows(caption, rows.iter().map(row)));
+    let table = Block::Table(Table::of_rows(caption, results.rows.iter().map(row)));
     Report::new(
         "K_hg through a torsion bar",
         summary,

@@ -181,8 +181,8 @@ impl Problem<'_> {
         });
         if options.assisted || options.wheel_inertia.is_some() {
             found.assumed.push(
-                "k_hg is the driver's answer to guidance_torque_nm: beside a power assist that is less than the answer to what comes up to the \
-                 hands, by 1 + the slope of the assist"
+                "k_hg is the driver's answer to guidance_torque_nm: beside a power assist it is smaller than the answer to what comes up to \
+                 the hands, by the factor 1 + slope of the assist"
                     .to_owned(),
             );
         }

@@ -19,7 +19,7 @@ pub use stretches::{LeftOut, Reason};
 use super::lane::{LaneDoubt, LaneNoise, Smoothed, smooth};
 use super::log::{COLUMNS, DriveLog};
 use super::options::Options;
-use super::wheel::{WHEEL_ROWS_S, WheelMotion};
+use super::wheel::{FIT_ROW_S, WheelMotion};
 
 /// Changes of e_y, e_theta, wheel angle, T_h and T_d below which a sample is never out of line: m, rad, rad, N.m, N.m.
 const LEAST: [f64; 5] = [5e-3, 5e-4, 1e-2, 0.06, 0.06];
@@ -223,7 +223,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     };
     if prepared.wheel.is_some() {
         // Rows of 0.05 s do not make 0.055 of it.
-        prepared.keep_every((WHEEL_ROWS_S / dt + 1e-6) as usize);
+        prepared.keep_every((FIT_ROW_S / dt + 1e-6) as usize);
     }
     prepared
 }
