@@ -31,6 +31,24 @@ pub(super) struct Origin {
     /// Earlier uses of held-out seeds.
     #[serde(default)]
     pub(super) earlier: Vec<Earlier>,
+    /// The last other code that was seen to give the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) same: Option<Same>,
+}
+
+/// Code that gave the same results, to the last digit, in the first of the runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Same {
+    pub(super) commit: String,
+    pub(super) count: Rule,
+}
+
+impl Origin {
+    /// The last commit whose code is known to give these numbers.
+    pub(super) fn holds_at(&self) -> &str {
+        self.same.as_ref().map_or(&self.commit, |same| &same.commit)
+    }
 }
 
 /// An earlier use of held-out seeds, and why there was another one.

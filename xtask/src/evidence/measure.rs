@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
 
-use super::kept::{Campaign, Cell, Earlier, Kept, Numbers, Origin, Row};
+use super::kept::{Campaign, Cell, Earlier, Kept, Numbers, Origin, Row, Same};
 use super::list::{List, Measurement, Rule, Seeds};
 use super::{all_kept, document, kept_in, replace, stale};
 use crate::built::Built;
@@ -74,7 +74,10 @@ pub(super) fn all(list: &List, names: &[String], asked: &Asked) -> Result<()> {
             parts: parts_in(name, &commit, count),
         };
         let numbers = match measurement.rule {
-            Rule::Seeds(_) => Numbers::Campaign(run.campaign(measurement)?),
+            Rule::Seeds(_) => {
+                let (rows, limit) = run.campaign()?;
+                Numbers::Campaign(Campaign::new(rows, limit, measurement.keeps))
+            }
             Rule::Hours(_) => Numbers::Availability(run.availability()?),
         };
         ensure!(
@@ -91,12 +94,55 @@ pub(super) fn all(list: &List, names: &[String], asked: &Asked) -> Result<()> {
             first_seed,
             held_out: measurement.seeds == Seeds::HeldOut,
             earlier,
+            same: None,
         };
         let path = kept_in(name);
         fs::create_dir_all(path.parent().unwrap_or(root()))?;
         replace(&path, &Kept { origin, numbers }.to_text()?)?;
         document::write(list, &all_kept(list)?)?;
         fs::remove_dir_all(&run.parts).with_context(|| run.parts.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// Looks whether today's code gives the same results as the code that measurements were made with, in the first twentieth of
+/// their runs: then a figure is not older than today's code, though it was measured before. `then` is the program of that code.
+pub(super) fn same(list: &List, names: &[String], then: &Path) -> Result<()> {
+    let commit = clean_commit()?;
+    let today = Built::ToShip.evidence()?;
+    for (number, name) in (1..).zip(names) {
+        println!("== {name} ({number} of {})", names.len());
+        let mut kept = Kept::read(&kept_in(name))?;
+        let measurement = &list.measurement[name];
+        let count = match measurement.rule {
+            Rule::Seeds(seeds) => Rule::Seeds(seeds.div_ceil(20)),
+            Rule::Hours(hours) => Rule::Hours(hours / 20.0),
+        };
+        let lines = |program: &Path, commit: &str| {
+            let run = Run {
+                program,
+                commit,
+                arguments: measurement.arguments(count, kept.origin.first_seed),
+                parts: parts_in(name, commit, count),
+            };
+            let lines = run.lines(measurement.rule)?;
+            fs::remove_dir_all(&run.parts).with_context(|| run.parts.display().to_string())?;
+            Ok::<_, anyhow::Error>(lines)
+        };
+        let [then, now] = [lines(then, kept.origin.holds_at())?, lines(&today, &commit)?];
+        if let Some((then, now)) = then.iter().zip(&now).find(|(then, now)| then != now) {
+            bail!("{name} has to be measured again. It was\n{then}\nand is\n{now}");
+        }
+        ensure!(
+            then.len() == now.len(),
+            "{name} has to be measured again: it has other rows"
+        );
+        kept.origin.same = Some(Same {
+            commit: commit.clone(),
+            count,
+        });
+        replace(&kept_in(name), &kept.to_text()?)?;
+        document::write(list, &all_kept(list)?)?;
     }
     Ok(())
 }
@@ -133,8 +179,8 @@ fn earlier(list: &List, name: &str, measurement: &Measurement, asked: &Asked) ->
     kept.retain(|_, origin| origin.first_seed == list.held_out_from);
     let mut used = BTreeMap::new();
     for (of, origin) in &kept {
-        let is_other = !stale::is_known(&origin.commit)
-            || !stale::changed(&origin.commit, &list.measurement[of].judged)?.is_empty();
+        let is_other = !stale::is_known(origin.holds_at())
+            || !stale::changed(origin.holds_at(), &list.measurement[of].judged)?.is_empty();
         used.insert(of.as_str(), (origin, is_other));
     }
     uses(name, asked.count(measurement.rule), asked.again, &used)
@@ -217,7 +263,7 @@ struct Drives {
 
 impl Run<'_> {
     /// Every row that runs there, some at a time: they do not depend on each other.
-    fn campaign(&self, measurement: &Measurement) -> Result<Campaign> {
+    fn campaign(&self) -> Result<(Vec<Row>, Option<f64>)> {
         let table = output(command(&self.program.to_string_lossy()).args(["faults", "--list"]))?;
         let has_bar = self.arguments.contains("--world bar");
         let names = rows_of(&table, self.arguments.contains("--target"), has_bar);
@@ -236,7 +282,7 @@ impl Run<'_> {
             rows.extend(part.rows);
             limit = part.limits.left_lane;
         }
-        Ok(Campaign::new(rows, limit, measurement.keeps))
+        Ok((rows, limit))
     }
 
     /// Its drives go on from a checkpoint.
@@ -246,6 +292,15 @@ impl Run<'_> {
         let drives: Drives = serde_json::from_str(&text).context("cargo xtask availability --json")?;
         self.is_of_commit(&drives.provenance)?;
         Ok(drives.cells.into_iter().chain(drives.together).collect())
+    }
+
+    /// Its results, a line each.
+    fn lines(&self, rule: Rule) -> Result<Vec<String>> {
+        let lines: serde_json::Result<Vec<String>> = match rule {
+            Rule::Seeds(_) => self.campaign()?.0.iter().map(serde_json::to_string).collect(),
+            Rule::Hours(_) => self.availability()?.iter().map(serde_json::to_string).collect(),
+        };
+        Ok(lines?)
     }
 
     /// What the program prints, or printed before an interruption.
@@ -319,6 +374,7 @@ mod tests {
             first_seed: 77,
             held_out: true,
             earlier: Vec::new(),
+            same: None,
         };
         let used = BTreeMap::from([(of, (&origin, is_other))]);
         let earlier = uses("relying", Rule::Seeds(seeds), again, &used).map_err(|e| e.to_string())?;

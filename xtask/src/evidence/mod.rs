@@ -45,6 +45,10 @@ pub(crate) struct Options {
     /// Why held-out seeds are used once more: with other code, or more or fewer of them. The documents say it
     #[arg(long, value_name = "WHY")]
     again: Option<String>,
+    /// See whether today's code gives the same in the first twentieth of the runs, to the last digit, and keep the figures if it
+    /// does. PROGRAM is the one of their commit: target/release/evidence of a checkout of it
+    #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["seeds", "hours", "again"])]
+    same: Option<PathBuf>,
     /// List the measurements that are older than the code that they judge, or missing: exit code 1 if there is one
     #[arg(long, conflicts_with_all = ["names", "all", "check", "write"])]
     stale: bool,
@@ -73,23 +77,33 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         hours: options.hours,
         again: options.again.as_deref(),
     };
-    if options.all {
-        return measure::all(&list, &stale_or_missing(&list)?, &asked);
-    }
-    if options.names.is_empty() {
-        if options.seeds.is_some() || options.hours.is_some() || options.again.is_some() {
-            let message = "--seeds, --hours and --again are of a measurement: NAME, or --all";
+    let names = match options.all {
+        true => &stale_or_missing(&list)?,
+        false => &options.names,
+    };
+    if names.is_empty() && !options.all {
+        let is_given = [
+            options.seeds.is_some(),
+            options.hours.is_some(),
+            options.again.is_some(),
+            options.same.is_some(),
+        ];
+        if is_given.contains(&true) {
+            let message = "--seeds, --hours, --again and --same are of a measurement: NAME, or --all";
             return Err(Usage(message.into()).into());
         }
         return print(&list, |_| true);
     }
-    for name in &options.names {
+    for name in names {
         if !list.measurement.contains_key(name) {
             let names: Vec<&str> = list.measurement.keys().map(String::as_str).collect();
             return Err(Usage(format!("{name}: {LIST} has {}", names.join(", "))).into());
         }
     }
-    measure::all(&list, &options.names, &asked)
+    match &options.same {
+        Some(then) => measure::same(&list, names, then),
+        None => measure::all(&list, names, &asked),
+    }
 }
 
 /// Holds the documents' tables to what is kept.

@@ -58,22 +58,19 @@ pub(super) fn state(measurement: &Measurement, kept: Option<&Kept>) -> Result<St
     let Some(Kept { origin, .. }) = kept else {
         return Ok(State::Missing);
     };
-    let commit = origin.commit[..12.min(origin.commit.len())].to_owned();
-    if !is_known(&origin.commit) {
+    let holds_at = origin.holds_at();
+    let commit = holds_at[..12.min(holds_at.len())].to_owned();
+    if !is_known(holds_at) {
         return Ok(State::Unknown(commit));
     }
     let command = measurement.arguments(origin.count, origin.first_seed);
-    // Earlier ones were made by a command of host-sim.
-    let kept = ["host-sim", PROGRAM]
-        .iter()
-        .find_map(|program| origin.command.strip_prefix(program));
-    if kept.map(str::trim_start) != Some(&command) {
+    if origin.command != format!("{PROGRAM} {command}") {
         return Ok(State::Differs("command"));
     }
     if origin.rule != measurement.rule {
         return Ok(State::Differs("rule"));
     }
-    let files = changed(&origin.commit, &measurement.judged)?;
+    let files = changed(holds_at, &measurement.judged)?;
     Ok(match files.is_empty() {
         true => State::Fresh {
             commit,

@@ -5,7 +5,7 @@ mod campaign;
 
 use std::collections::BTreeMap;
 
-use super::kept::{Earlier, Kept, Origin};
+use super::kept::{Earlier, Kept, Origin, Same};
 use super::list::{Form, List, Rule, Table};
 use availability::availability;
 use campaign::{campaigns, classes, ended, failures, goals, latent, left, pushed, sums};
@@ -83,8 +83,15 @@ fn measured(origin: &Origin) -> String {
             format!(", which were held out and used before {}", all.join(", "))
         }
     };
+    let same = origin
+        .same
+        .as_ref()
+        .map_or(String::new(), |Same { commit, count }| {
+            let commit = short(commit);
+            format!("; the code of commit `{commit}` gives the same to the last digit in the first {count}")
+        });
     format!(
-        "Measured at commit `{}` of {} {ran}, {rule}{held_out}",
+        "Measured at commit `{}` of {} {ran}, {rule}{held_out}{same}",
         short(&origin.commit),
         origin.date
     )

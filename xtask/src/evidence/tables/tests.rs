@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use super::super::kept::Kept;
+use super::super::kept::{Kept, Origin};
 use super::super::list::List;
 use super::{origin, render};
 
@@ -230,6 +230,19 @@ fn a_second_use_of_held_out_seeds_is_said() {
         "Measured at commit `0123456789ab` of 2026-11-25 for 52 h on each road with seed 77, as fixed before, which were held out and used \
          before at commit `fedcba987654` with 20 h a road (run again: a rule was wrong): `cargo xtask evidence events`.\n"
     );
+}
+
+#[test]
+fn other_code_that_gives_the_same_is_said() {
+    let text = r#"{"command":"c","commit":"0123456789abcdef","date":"2026-11-25","rule":{"seeds":500},"count":{"seeds":500},
+        "first_seed":1,"held_out":false,"same":{"commit":"fedcba9876543210","count":{"seeds":25}}}"#;
+    let own: Origin = serde_json::from_str(text).unwrap();
+    assert_eq!(
+        origin(&[("paper", Some(&own))]),
+        "Measured at commit `0123456789ab` of 2026-11-25 on seeds 1 to 500 of each row, as fixed before; the code of commit `fedcba987654` \
+         gives the same to the last digit in the first 25 seeds: `cargo xtask evidence paper`.\n"
+    );
+    assert_eq!(own.holds_at(), "fedcba9876543210");
 }
 
 #[test]
