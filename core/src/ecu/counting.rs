@@ -114,7 +114,8 @@ impl Counting {
     pub(super) fn go_on(&mut self, ahead: u8, frame: &Frame, now: Instant, periods: &Periods) -> bool {
         let ahead = u32::from(ahead).max(1);
         let per_count = Micros::from_us(self.pace.us() / 2).max(periods.fastest);
-        let cost = Micros::from_us(per_count.us().saturating_mul(ahead));
+        // No pace is longer than the slowest sender's period, so that no product and no sum here wraps.
+        let cost = Micros::from_us(per_count.us().wrapping_mul(ahead));
         if cost > now.since(self.spent) {
             self.disturb();
             return false;
@@ -130,8 +131,8 @@ impl Counting {
         // A pause is no pace: it counts as the slowest sender's.
         let apart = now.since(self.heard).us().checked_div(ahead);
         let apart = apart.unwrap_or(u32::MAX).min(periods.slowest.us());
-        let kept = self.pace.us().saturating_sub(self.pace.us() >> PACE_SHIFT);
-        self.pace = Micros::from_us(kept.saturating_add(apart >> PACE_SHIFT));
+        let kept = self.pace.us().wrapping_sub(self.pace.us() >> PACE_SHIFT);
+        self.pace = Micros::from_us(kept.wrapping_add(apart >> PACE_SHIFT));
         self.heard = now;
         self.last = words_of(frame);
         self.marks = Marks {
@@ -190,7 +191,7 @@ fn words_of(frame: &Frame) -> [u32; 2] {
     [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
 }
 
-/// What the bucket holds at most: the cost of the counts that may come at once.
+/// What the bucket holds at most: the cost of the counts that may come at once. A count costs no more than a period.
 fn at_once(per_count: Micros) -> Micros {
-    Micros::from_us(per_count.us().saturating_mul(AT_ONCE))
+    Micros::from_us(per_count.us().wrapping_mul(AT_ONCE))
 }

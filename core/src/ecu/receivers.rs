@@ -187,7 +187,8 @@ impl<T: Words> Slot<T> {
         } else if apart > period {
             apart
         } else {
-            period.saturating_sub(period.saturating_sub(apart) >> PERIOD_SHIFT)
+            // No less than `apart`.
+            period.wrapping_sub(period.wrapping_sub(apart) >> PERIOD_SHIFT)
         };
         self.period = Micros::from_us(period).max(LEAST_PERIOD);
         (self.state, self.value, self.at) = (NEW, value, now);

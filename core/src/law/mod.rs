@@ -293,14 +293,13 @@ impl Coefficients {
         let tau = i64::from(self.tau);
         // 2^8 for the format of tau, 2^-4 from the errors' 24 fractional bits to the rates' 20.
         let change = i64::from(to.to_bits())
-            .saturating_sub(i64::from(from.to_bits()))
-            .saturating_mul(1_000_000 << 4);
-        // 32 bits times 31.
-        let sum = tau.wrapping_mul(i64::from(rate.to_bits())).saturating_add(change);
+            .wrapping_sub(i64::from(from.to_bits()))
+            .wrapping_mul(1_000_000 << 4);
+        let sum = tau.wrapping_mul(i64::from(rate.to_bits())).wrapping_add(change);
         // At most 100 ms and 320 ms, in 2^-8 us.
-        let span = self.tau.saturating_add(dt.us().saturating_mul(1 << 8));
+        let span = self.tau.wrapping_add(dt.us().wrapping_mul(1 << 8));
         // Rounded to nearest.
-        let size = sum.unsigned_abs().saturating_add(u64::from(span >> 1));
+        let size = sum.unsigned_abs().wrapping_add(u64::from(span >> 1));
         let size = I12F20::from_bits(quotient(size, span).min(MOST).cast_signed());
         if sum < 0 { size.wrapping_neg() } else { size }
     }
