@@ -15,7 +15,7 @@ mod monitor;
 mod sensor;
 
 use crate::controller::params::{DRIVER_ACTIVITY, LAWS, ParamError, Params, SENSORS, in_range, whole};
-use crate::estimator::{BLOCK_S, Complex, Estimator, T_NMS_SD_S};
+use crate::estimator::{BLOCK_S, Complex, Estimator, QUIET, T_NMS_SD_S};
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::law::{Coefficients, Law, LawWords};
@@ -248,7 +248,8 @@ impl Estimator {
                 im: (slower_im - im) as f32,
             },
             k_nms: p.k_nms as f32,
-            quiet: sensor::quiet(p),
+            unsure: sensor::unsure(p, turns, [re, im]) as f32,
+            quiet: if p.has_bar() { sensor::QUIET } else { QUIET },
         }
     }
 }

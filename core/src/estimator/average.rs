@@ -37,12 +37,15 @@ pub(super) struct Answer {
     pub(super) k_hg: Complex,
     /// By how much it is more with a t_nms that is larger by one deviation of the prior.
     pub(super) slower: Complex,
+    /// Variance of K_hg by what is not known of a bar.
+    pub(super) unsure: f32,
 }
 
 impl Answer {
     fn add(&mut self, weight: f32, other: &Self) {
         self.k_hg.add(weight, other.k_hg);
         self.slower.add(weight, other.slower);
+        self.unsure += weight * other.unsure;
     }
 }
 
@@ -174,8 +177,8 @@ impl Average {
             (self.mean, self.count) = (Answer::default(), change.count);
             self.mean.add(1.0 / f32::from(change.count), &change.sum);
         }
-        let Answer { k_hg, slower } = self.mean;
-        let noise = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR;
+        let Answer { k_hg, slower, unsure } = self.mean;
+        let noise = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR + unsure;
         // With the arm's own t_nms, larger by u deviations, the mean is k_hg + u*slower, whose imaginary part is noise alone. So
         // u is `by`, with the variance `left` that remains of the prior's 1.
         let square = noise + slower.im * slower.im;

@@ -56,6 +56,8 @@ pub struct Estimator {
     pub(crate) slower: Complex,
     /// K_nms, N.m/rad.
     pub(crate) k_nms: f32,
+    /// Variance of K_hg that averaging does not reduce, times the square of T_h per angle of the wheel: what is not known of a bar.
+    pub(crate) unsure: f32,
     /// If T_d stays within this band for half a block, nobody holds the wheel.
     pub(crate) quiet: Torque,
 }
@@ -271,8 +273,8 @@ impl Estimator {
 
     /// The reading of a block, if enough of the probe was applied in it.
     fn reading(&self, block: &Block) -> Option<Answer> {
-        let applied = block.applied;
-        let power = applied.re * applied.re + applied.im * applied.im;
+        let (applied, square) = (block.applied, |of: Complex| of.re * of.re + of.im * of.im);
+        let power = square(applied);
         // The coefficient of a sine is half its amplitude times the sum of the window's weights.
         let least = LEAST_SHARE * 0.5 * self.amplitude_nm * block.weight;
         ((power > 0.0) & (power >= least * least)).then(|| {
@@ -286,6 +288,7 @@ impl Estimator {
             Answer {
                 k_hg: right.times(per_applied),
                 slower: self.slower.times(block.driver).times(per_applied),
+                unsure: self.unsure * square(block.wheel) / power,
             }
         })
     }

@@ -6,13 +6,13 @@
 //! T_hand = T_tb + J_w phi_w'' + B_w phi_w' + friction,   phi_w = phi_c + T_tb/K_tb
 //! ```
 //!
-//! [`Observer`] is that equation as an extended-state observer: angle, rate, and as a third state, that no equation drives, the torque on
-//! the wheel beside the bar's, which is the hands' without damping and friction. Each step of 1 ms predicts them from T_tb; each sample of
-//! the angle corrects them. The gains are those of a filter with fading memory, all three poles at `exp(-w T)` for a bandwidth w and
-//! samples every T, so that the estimate is the torque behind three equal lags: [`crate::controller::config::hands_lag_s`] for a torque
-//! that changes slowly. Torque of the bar and inertia of the wheel come through the same lags, which is why a free wheel, however the
-//! motor turns it, reads as no hand. Damping and friction are added behind, by the estimated rate: in the prediction they would make the
-//! lags longer. A step that comes late predicts a millisecond all the same, which the next sample corrects.
+//! [`Observer`] is that equation as an extended-state observer: angle, rate, and as a third state, that no equation drives, the torque of
+//! the hands. Each step of 1 ms predicts them from T_tb, damping and friction; each sample of the angle corrects them. The gains are those
+//! of a filter with fading memory, all three poles at `exp(-w T)` for a bandwidth w and samples every T, so that the estimate is the torque
+//! behind three equal lags: [`crate::controller::config::hands_lag_s`] for a torque that changes slowly, and longer by a share of
+//! B_w/(J_w w). Every other torque of the equation comes through the same lags, which is why a free wheel, however the motor turns it,
+//! reads as no hand, and why the lags can be undone at a known frequency. A step that comes late predicts a millisecond all the same,
+//! which the next sample corrects.
 //!
 //! Terms: *wheel* and *column* are the ends of the bar, with the angles phi_w and phi_c.
 //!
@@ -119,8 +119,8 @@ words! {
     pub struct State {
         /// phi_w, rad.
         angle: I8F56,
-        /// Torque on the wheel beside the bar's: T_hand less damping and friction, N.m.
-        beside: I8F56,
+        /// T_hand, N.m.
+        hands: I8F56,
         /// phi_w', rad/ms.
         rate: I0F32,
         /// T_tb of the last step, N.m.
@@ -136,7 +136,7 @@ impl State {
     /// Nothing seen.
     pub const NEW: Self = Self {
         angle: I8F56::ZERO,
-        beside: I8F56::ZERO,
+        hands: I8F56::ZERO,
         rate: I0F32::ZERO,
         bar: I8F24::ZERO,
         given: I2F30::ZERO,
@@ -145,7 +145,7 @@ impl State {
 }
 
 /// No driver turns a wheel harder by hand, as the bus has it.
-const MOST_HANDS: Torque = Torque::from_nm(20.0);
+const MOST_HANDS: I8F56 = I8F56::const_from_int(20);
 /// 100 rad/s, per millisecond: no wheel turns faster.
 const MOST_RATE: I0F32 = I0F32::from_bits(429_496_730);
 /// An angle that is further than this from what was predicted is a jump of a sensor, and no wheel's.
@@ -168,16 +168,8 @@ impl Observer {
         state.bar = bar;
         // No flipped bit and no sensor may move a state to where its products leave their formats.
         state.rate = state.rate.min(MOST_RATE).max(MOST_RATE.saturating_neg());
-        let most = I8F56::from_num(MOST_HANDS.fixed());
-        state.beside = state.beside.min(most).max(most.saturating_neg());
-        let hands = I8F24::wrapping_from_num(state.beside).saturating_add(self.resists(state));
-        Torque::from_fixed(hands).within(MOST_HANDS)
-    }
-
-    /// Friction of a wheel that slides.
-    #[must_use]
-    pub const fn friction(&self) -> Torque {
-        Torque::from_fixed(self.friction)
+        state.hands = state.hands.min(MOST_HANDS).max(MOST_HANDS.saturating_neg());
+        Torque::from_fixed(I8F24::wrapping_from_num(state.hands))
     }
 
     /// phi_w by the angle measured.
@@ -207,7 +199,8 @@ impl Observer {
     /// A millisecond on: the rate moves with what is left of the torques, the angle with the mean of both rates.
     fn predict(&self, state: &mut State, bar: I8F24) {
         let mean = (bar.wrapping_shr(1)).saturating_add(state.bar.wrapping_shr(1));
-        let left = I8F24::wrapping_from_num(state.beside).saturating_sub(mean);
+        let against = self.resists(state).saturating_add(mean);
+        let left = I8F24::wrapping_from_num(state.hands).saturating_sub(against);
         let before = state.rate;
         let change = I0F32::wrapping_from_num(left.wide_mul(self.by_torque));
         state.rate = before.saturating_add(change);
@@ -226,8 +219,8 @@ impl Observer {
         state.angle = state.angle.saturating_add(angle);
         let rate = I0F32::wrapping_from_num(off.wide_mul(self.to_rate));
         state.rate = state.rate.saturating_add(rate);
-        let beside = I8F56::saturating_from_num(off.wide_mul(self.to_torque));
-        state.beside = state.beside.saturating_add(beside);
+        let hands = I8F56::saturating_from_num(off.wide_mul(self.to_torque));
+        state.hands = state.hands.saturating_add(hands);
     }
 }
 
@@ -241,7 +234,7 @@ fn begin(state: &mut State, sampled: Option<I8F24>, bar: I8F24) {
     *state = State {
         is_known: u32::from(sampled.is_some()),
         angle: I8F56::from_num(sampled.unwrap_or(I8F24::ZERO)),
-        beside: I8F56::from_num(bar),
+        hands: I8F56::from_num(bar),
         ..State::NEW
     };
 }

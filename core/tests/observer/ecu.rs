@@ -21,6 +21,9 @@ const BAR: Params = Params {
     ..Params::PAPER
 };
 
+/// How far the wheel gives before it slides, rad.
+const GIVE_RAD: f64 = 0.0035;
+
 /// Wheel and column, as they differ from a bend that they have settled in, and the hands of equation (8).
 #[derive(Default)]
 struct Car {
@@ -29,6 +32,9 @@ struct Car {
     /// What the hands do beyond what they did when the probe began; none of it without hands.
     hands_nm: f64,
     k_hg: Option<f64>,
+    /// Friction of the wheel after Dahl, N.m, and the share of it that the wheel has given.
+    friction_nm: f64,
+    given: f64,
 }
 
 impl Car {
@@ -38,7 +44,10 @@ impl Car {
         let [j_c, b_c, k_c] = COLUMN;
         for _ in 0..20 {
             let bar = k_tb * (self.wheel[0] - self.column[0]);
-            let wheel = (self.hands_nm - bar - b_w * self.wheel[1]) / j_w;
+            let turned = 5e-5 * self.wheel[1] / GIVE_RAD;
+            self.given += turned - turned.abs() * self.given;
+            let resists = b_w * self.wheel[1] + self.friction_nm * self.given;
+            let wheel = (self.hands_nm - bar - resists) / j_w;
             let column = (bar + guidance_nm - b_c * self.column[1] - k_c * self.column[0]) / j_c;
             for (body, acceleration) in [(&mut self.wheel, wheel), (&mut self.column, column)] {
                 body[1] += 5e-5 * acceleration;
@@ -54,7 +63,7 @@ impl Car {
 }
 
 /// An ECU that believes something of its sensor, in a bend, and then 14 s with the probe, less than it warns after; what its hands do, and the last K_hg with its deviation.
-fn with_probe(believed: &Params, k_hg: Option<f64>) -> (Vec<[f64; 2]>, Option<[f64; 2]>) {
+fn with_probe(believed: &Params, k_hg: Option<f64>, friction_nm: f64) -> (Vec<[f64; 2]>, Option<[f64; 2]>) {
     let mut rig = Rig::new(Some(&Setup::new(believed).unwrap()), Boot::default());
     rig.curve(0.6);
     rig.run(600);
@@ -65,6 +74,7 @@ fn with_probe(believed: &Params, k_hg: Option<f64>) -> (Vec<[f64; 2]>, Option<[f
     rig.probe = true;
     let mut car = Car {
         k_hg,
+        friction_nm,
         ..Car::default()
     };
     let mut seen = Vec::new();
@@ -93,7 +103,7 @@ fn k_hg_is_read_through_the_bar() {
     for k_hg in [0.6, 1.0] {
         for torque_sensor in [1.0, 2.0] {
             let believed = Params { torque_sensor, ..BAR };
-            let (seen, reading) = with_probe(&believed, Some(k_hg));
+            let (seen, reading) = with_probe(&believed, Some(k_hg), 0.0);
             let [found, deviation] = reading.unwrap();
             assert!(
                 (found - k_hg).abs() < 0.05 && deviation < 0.5,
@@ -109,9 +119,44 @@ fn k_hg_is_read_through_the_bar() {
     }
 }
 
+/// Friction of the wheel, its inertia and the bar are told right, or not.
+#[test]
+fn what_is_read_behind_friction_is_right_within_its_deviation() {
+    for k_hg in [0.6, 1.0] {
+        for (friction_nm, [friction_is, inertia_is, bar_is], off) in [
+            (0.05, [1.0; 3], 0.1),
+            (0.2, [1.0; 3], 0.1),
+            (0.2, [0.7, 1.0, 1.0], 1.0),
+            (0.2, [1.3, 1.0, 1.0], 1.0),
+            (0.2, [1.0, 0.7, 1.0], 1.0),
+            (0.2, [1.0, 1.3, 1.0], 1.0),
+            (0.2, [1.0, 1.0, 0.9], 0.1),
+            (0.2, [1.0, 1.0, 1.1], 0.1),
+        ] {
+            let believed = Params {
+                wheel_friction_nm: friction_is * friction_nm,
+                wheel_inertia_kg_m2: inertia_is * 0.044,
+                bar_stiffness_nm_per_rad: bar_is * 143.24,
+                ..BAR
+            };
+            let (_, reading) = with_probe(&believed, Some(k_hg), friction_nm);
+            // A hand that seems to do next to nothing is none, and has no reading.
+            let Some([found, deviation]) = reading else {
+                assert!(friction_is > 1.0, "{believed:?} {k_hg}");
+                continue;
+            };
+            let error = (found - k_hg).abs();
+            assert!(
+                error < off && error < 2.0 * deviation && deviation < 0.5,
+                "{believed:?} {k_hg}: {found} +- {deviation}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_free_wheel_has_no_k_hg() {
-    let (seen, reading) = with_probe(&BAR, None);
+    let (seen, reading) = with_probe(&BAR, None, 0.0);
     assert_eq!(reading, None);
     let most = seen[5000..]
         .iter()
@@ -119,7 +164,7 @@ fn a_free_wheel_has_no_k_hg() {
         .fold(0.0, f64::max);
     assert!(most < 0.05, "{most}");
     // Its bar moves, so that it is taken for hands where the parameters say so.
-    assert!(with_probe(&Params::PAPER, None).1.is_some());
+    assert!(with_probe(&Params::PAPER, None, 0.0).1.is_some());
 }
 
 /// What the observer says of a wheel that nobody holds varies by 0.1 N.m at most. Here bar and hands are the same but for lags too short to

@@ -134,12 +134,15 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, StudyError
     })
 }
 
-/// Why what the ECU read of K_hg is not to be believed.
+/// Why what the ECU read of K_hg is not to be believed: its deviation is that of a wheel known to 15 %.
 fn friction_note(scenario: &Scenario) -> Option<String> {
-    let column = scenario.column();
-    let is_hidden = column.has_bar() && column.upper_friction_nm > 0.0;
-    is_hidden.then(|| {
-        let note = "friction of the wheel, column.upper_friction_nm, makes what the ECU reads of K_hg through a bar wrong";
+    let (column, told) = (scenario.column(), &scenario.guidance().controller);
+    let is_off = |told: f64, is: f64| (told - is).abs() > 0.3 * is + 1e-12;
+    let is_wrong = is_off(told.wheel_friction_nm, column.upper_friction_nm)
+        || is_off(told.wheel_inertia_kg_m2, column.j_w_kg_m2);
+    (column.has_bar() && is_wrong).then(|| {
+        let note = "friction and inertia of the wheel, as guidance has them, are more than 30 % off those of column, and the deviation of what the \
+             ECU reads of K_hg does not know of it";
         format!("{note}: docs/explanation/torsion-bar.md")
     })
 }
@@ -167,19 +170,23 @@ mod tests {
     use haptic_sim::models::torsion_bar::{ColumnKind, ColumnParameters};
 
     #[test]
-    fn a_reading_through_a_wheel_with_friction_is_doubted() {
-        for (kind, upper_friction_nm, is_doubted) in [
-            (ColumnKind::TorsionBar, 0.01, true),
-            (ColumnKind::TorsionBar, 0.0, false),
-            (
-                ColumnKind::Rigid,
-                ColumnParameters::default().upper_friction_nm,
-                false,
-            ),
+    fn a_reading_through_another_wheel_than_the_ecu_is_told_of_is_doubted() {
+        // The ECU is told of 0.2 N.m and 0.044 kg.m2.
+        for (kind, upper_friction_nm, j_w_kg_m2, is_doubted) in [
+            (ColumnKind::TorsionBar, 0.2, 0.044, false),
+            (ColumnKind::TorsionBar, 0.155, 0.044, false),
+            (ColumnKind::TorsionBar, 0.285, 0.044, false),
+            (ColumnKind::TorsionBar, 0.153, 0.044, true),
+            (ColumnKind::TorsionBar, 0.287, 0.044, true),
+            (ColumnKind::TorsionBar, 0.0, 0.044, true),
+            (ColumnKind::TorsionBar, 0.2, 0.033, true),
+            (ColumnKind::TorsionBar, 0.2, 0.064, true),
+            (ColumnKind::Rigid, 0.0, 0.033, false),
         ] {
             let column = ColumnParameters {
                 kind,
                 upper_friction_nm,
+                j_w_kg_m2,
                 ..ColumnParameters::default()
             };
             let scenario = Scenario::builder().column(column).build().unwrap();

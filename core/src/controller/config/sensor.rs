@@ -4,14 +4,13 @@ use fixed::types::{I0F32, I2F30, I8F24, I16F16};
 
 use super::first_error;
 use crate::controller::params::{BAR_AND_COLUMN_ANGLE, ParamError, Params, in_range};
-use crate::estimator::QUIET;
 use crate::observer::{Observer, SensorWords};
 use crate::quantity::Torque;
 
 /// How far the wheel gives before it slides, rad: usual practice, as in the plant of `host-sim/column`.
 const GIVE_RAD: f64 = 0.0035;
 /// [`Estimator::quiet`](crate::estimator::Estimator) with a bar: what the observer says of a free wheel beside the probe.
-const QUIET_BEHIND_A_BAR: Torque = Torque::from_nm(0.1);
+pub(super) const QUIET: Torque = Torque::from_nm(0.1);
 const SAMPLES: &str = "observer_bandwidth_rad_per_s * column_period_s";
 const LOWER_DAMPING: &str = "vehicle.column_damping_nm_s - wheel_damping_nm_s";
 
@@ -29,12 +28,8 @@ pub(super) const fn check(p: &Params) -> Result<(), ParamError> {
 
 /// B_c of a column whose wheel is apart, and otherwise B_s.
 pub(super) const fn lower_damping(p: &Params) -> f64 {
-    let all = p.vehicle.column_damping_nm_s;
-    if p.has_bar() {
-        all - p.wheel_damping_nm_s
-    } else {
-        all
-    }
+    let above = if p.has_bar() { p.wheel_damping_nm_s } else { 0.0 };
+    p.vehicle.column_damping_nm_s - above
 }
 
 /// The sensor of parameters that are in range.
@@ -86,9 +81,13 @@ pub(super) const fn arm(p: &Params, turns: f64, t_nms_s: f64) -> [f64; 2] {
     arm
 }
 
-/// Within which band T_d says that nobody holds the wheel.
-pub(super) const fn quiet(p: &Params) -> Torque {
-    if p.has_bar() { QUIET_BEHIND_A_BAR } else { QUIET }
+/// Variance of K_hg through a bar for 1 N.m of T_h that turns the wheel by 1 rad. J_w and friction are known to 15 %; a wheel that slides
+/// has about half of the friction that it has for a turn so small that it gives.
+pub(super) const fn unsure(p: &Params, turns: f64, [re, im]: [f64; 2]) -> f64 {
+    let share = if p.has_bar() { 0.15 } else { 0.0 };
+    let inertia = share * p.wheel_inertia_kg_m2 * turns * turns;
+    let friction = share * p.wheel_friction_nm / (2.0 * GIVE_RAD);
+    (re * re + im * im) * (inertia * inertia + friction * friction)
 }
 
 /// How far what is known of the hands is behind a torque that changes slowly, s: nothing with a sensor of theirs; with a bar three lags

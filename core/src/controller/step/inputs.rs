@@ -43,7 +43,7 @@ impl<I: Injection> Step<'_, I> {
                     // How much of its friction a wheel that hardly turns has given, nobody sees.
                     let unsure = match self.sensor {
                         Sensor::Hands => Torque::ZERO,
-                        Sensor::Bar(observer) => observer.friction(),
+                        Sensor::Bar(observer) => Torque::from_fixed(observer.friction),
                     };
                     self.memory.fast.hands.update(hands, unsure);
                 }
