@@ -82,6 +82,9 @@ pub struct Balance {
     /// What the part that is not explained could make of the scale at most, if it were all guidance torque.
     #[serde(skip)]
     pub(crate) scale_leeway: f64,
+    /// What it could make of the delay of T_d at most, s, if it were all rate of T_d.
+    #[serde(skip)]
+    pub(crate) late_leeway_s: f64,
     /// Time that straight lines between rows leave open, s: half of their distance, and all of it where they are uneven or far apart.
     #[serde(skip)]
     pub(crate) row_leeway_s: f64,
@@ -232,12 +235,13 @@ fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Opt
     let stiff = 2..columns.scale.len();
     columns.push(&vec![1.0; log.len()], rows);
     columns.push(&pass(turning, dt, 0.0).value, rows);
-    let first_of_torques = columns.scale.len();
+    // Where the columns of the torques begin.
+    let d = columns.scale.len();
     let (mut driver_late, mut guidance_late) = (0.0_f64, 0.0_f64);
     let mut found = None;
     for _ in 0..ROUNDS {
         let driver = pass(&log.driver_torque_nm, dt, driver_late);
-        columns.truncate(first_of_torques);
+        columns.truncate(d);
         columns.push(&driver.rate, rows);
         if guided {
             let guidance = pass(&held, dt, guidance_late);
@@ -246,7 +250,6 @@ fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Opt
         }
         let torque: Vec<f64> = rows.iter().map(|&k| driver.value[k]).collect();
         let fit = regress(&torque, &mut columns, (BLOCK_S / dt) as usize)?;
-        let d = first_of_torques;
         let step = -fit.weights[d];
         driver_late += step.clamp(-0.03, 0.03);
         let mut more = 0.0_f64;
@@ -284,6 +287,7 @@ fn weighed(log: &DriveLog, rows: &[usize], manual: bool, turning: &[f64]) -> Opt
             seconds: rows.len() as f64 * dt,
             angle_step_rad: step_of(&log.wheel_angle_rad, rows),
             scale_leeway: if guided { fit.leeway[d + 1] } else { 0.0 },
+            late_leeway_s: fit.leeway[d],
             row_leeway_s: if is_even && dt <= FINE_ROWS_S {
                 0.5 * apart_s
             } else {

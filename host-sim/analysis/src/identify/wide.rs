@@ -26,7 +26,8 @@ pub(crate) fn window<'a>(u: &'a [f64], from: usize, spare: &'a mut [f64; BLOCK])
     }
 }
 
-/// Sum of the products of `a` and `b`, over the shorter of the two.
+/// Sum of the products of `a` and `b`, over the shorter of the two; in the registers of whoever calls it.
+#[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let ((a, rest_a), (b, rest_b)) = (a[..n].as_chunks::<PARTS>(), b[..n].as_chunks::<PARTS>());
@@ -90,26 +91,11 @@ pub(crate) fn add_products_of_columns<const N: usize>(
     with_errors: &mut [f64; N],
 ) {
     for i in 0..N {
-        with_errors[i] += dot_of_block(&columns[i], errors);
+        with_errors[i] += dot(&columns[i], errors);
         for j in 0..=i {
-            gram[i][j] += dot_of_block(&columns[i], &columns[j]);
+            gram[i][j] += dot(&columns[i], &columns[j]);
         }
     }
-}
-
-#[inline(always)]
-fn dot_of_block(a: &[f64; BLOCK], b: &[f64; BLOCK]) -> f64 {
-    let mut parts = [0.0; PARTS];
-    for k in 0..BLOCK / PARTS {
-        for i in 0..PARTS {
-            parts[i] += a[k * PARTS + i] * b[k * PARTS + i];
-        }
-    }
-    let mut sum = 0.0;
-    for part in parts {
-        sum += part;
-    }
-    sum
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
 use super::sums::Rows;
-use super::uncertainty::Doubts;
+use super::uncertainty::{Doubts, TRIMMED_AT_MOST};
 use super::{
     Assumed, COMPARED, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem,
     SMALLEST_ERROR_NM, START, T_NMS, T_NMS_RANGE_S, T_P, VARIATION_WIDTHS, WHEEL, WHEEL_SHARE,
@@ -37,6 +37,9 @@ const HIDDEN: f64 = 2.0;
 /// would gain in a record that tells whether there is one.
 const LEAST_GAIN: f64 = 60.0;
 const TELLING: f64 = 2.0;
+/// A record with a larger standard error of K_hg, a quarter of its range, does not tell it: guidance without a probe is made of what the
+/// driver sees, and straight lines between uneven rows are then taken for an answer to it.
+const UNTOLD_K_HG: f64 = 0.25;
 /// Guidance beyond this, N.m, is no offset of a sensor.
 const GUIDED_NM: f64 = 0.03;
 /// Rows that are further apart do not tell the driver's muscle, whose lag is 0.1 s: at 10 Hz K_hg's optimum is off by three times as
@@ -247,6 +250,10 @@ impl Problem<'_> {
         let refutation = |&(i, unbounded): &(usize, f64)| {
             let error = doubts.errors[(i, i)].sqrt();
             let beyond = doubts.active.pull[i] / error;
+            // These errors hold the arm, a line and the lane's noise too.
+            if beyond.abs() < TRIMMED_AT_MOST || i == K_HG && error > UNTOLD_K_HG {
+                return None;
+            }
             let Bounds { low, high } = self.bounds[i];
             let name = NAMES[i]?;
             let (assumption, cause, cure) = match i {

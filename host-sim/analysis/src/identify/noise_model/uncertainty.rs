@@ -5,14 +5,14 @@ use nalgebra::{DMatrix, DVector};
 use super::delays::Line;
 use super::evidence::Alternative;
 use super::sums::Rows;
-use super::{COUNT, DRIVER, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS};
+use super::{COUNT, DRIVER, K_HG, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS};
 use crate::identify::change::Constancy;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::AtTNms;
 use crate::identify::search::{Optimum, covariance};
 
 /// Standard errors by which a bound may move an optimum; beyond, the data contradict it.
-const TRIMMED_AT_MOST: f64 = 3.0;
+pub(super) const TRIMMED_AT_MOST: f64 = 3.0;
 
 /// Share of its variation interval by which a parameter may pass a bound all the same: in a record without noise,
 /// standard errors are that small.
@@ -192,7 +192,9 @@ impl Problem<'_> {
         } else {
             let others: Vec<usize> = free.iter().copied().filter(|i| !bounds.contains(i)).collect();
             let with_bounds = covariance(&optimum.quadratic.hessian, &others) * variance;
-            std::array::from_fn(|i| beyond(i, &with_bounds))
+            // A delay that is none's may be another optimum's: no gain of it is a driver's.
+            let is_no_delay = bounds.contains(&T_P);
+            std::array::from_fn(|i| beyond(i, &with_bounds) || is_no_delay && i < K_HG)
         };
         ActiveBounds {
             bounds: bounds
