@@ -151,6 +151,12 @@ impl Mean {
         })
     }
 
+    /// The interval's ends; of a single value, itself.
+    #[must_use]
+    pub fn ends(&self) -> [f64; 2] {
+        self.interval.unwrap_or([self.mean; 2])
+    }
+
     /// A figure that is no mean of the draws' own, with Tukey's interval from the figures that are left without each draw in turn; none of
     /// fewer than two.
     pub(crate) fn tukey(whole: f64, left: &[f64], level: Confidence) -> Self {

@@ -197,6 +197,16 @@ impl Series {
         Self::with_mark(label, style, Mark::Dots, points)
     }
 
+    /// Points, each with its interval.
+    pub fn whiskers(
+        label: &str,
+        style: usize,
+        found: impl IntoIterator<Item = ((f64, f64), [f64; 2])>,
+    ) -> Self {
+        let (points, ends) = found.into_iter().unzip();
+        Self::with_mark(label, style, Mark::Whiskers(ends), points)
+    }
+
     /// An area between the values of `[low, high]`.
     pub fn interval(label: &str, style: usize, x: &[f64], ends: &[[f64; 2]]) -> Self {
         let lows = x.iter().zip(ends).map(|(x, [low, _])| (*x, *low)).collect();

@@ -150,10 +150,9 @@ fn maps_figure(results: &AdaptationResults) -> Figure {
     let panel = |(number, name): (usize, &String)| {
         let map = &results.maps[number];
         let of_driver = |(end, label): (usize, &str)| {
-            let found = || map.iter().filter_map(|point| Some((point.k_1, point.k_hg[end]?)));
-            let ends = found().map(|(_, value)| value.interval.unwrap_or([value.mean; 2]));
-            let points = found().map(|(k_1, value)| (k_1, value.mean)).collect();
-            Series::with_mark(label, 6 * end, Mark::Whiskers(ends.collect()), points).joined()
+            let found = map.iter().filter_map(|point| Some((point.k_1, point.k_hg[end]?)));
+            let found = found.map(|(k_1, value)| ((k_1, value.mean), value.ends()));
+            Series::whiskers(label, 6 * end, found).joined()
         };
         // A gain that does not move is an upright line.
         let pairs = results.pairs.iter();

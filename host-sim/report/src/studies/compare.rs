@@ -5,7 +5,7 @@
 
 use super::{listed, with_interval};
 use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::compare::{
     Cell as Pair, CompareResults, FrontPoint, Kinds, LawResult, Metric, Ratio, Unit,
 };
@@ -357,9 +357,8 @@ fn front_figure(results: &CompareResults) -> Figure {
             .iter()
             .flat_map(|law| of_law(*law))
             .filter_map(|point| point.ratios);
-        let ends = |ratios: [Mean; 3]| ratios[traded].interval.unwrap_or([ratios[traded].mean; 2]);
-        let (points, ends) = alone.map(|ratios| (at(ratios), ends(ratios))).unzip();
-        let alone = Series::with_mark("laws of one set", 0, Mark::Whiskers(ends), points);
+        let alone = alone.map(|ratios| (at(ratios), ratios[traded].ends()));
+        let alone = Series::whiskers("laws of one set", 0, alone);
         Axis::new(quantity, "-").panel([alone].into_iter().chain(fronts.iter().enumerate().map(line)))
     };
     Axis::new("Peak lateral error", "-").figure([panel("Conflict", 2), panel("Effort", 1)])
@@ -458,9 +457,11 @@ fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
             let value = pair.values[place]?;
             Some(((super::place(pair.law), value.mean), value.interval?))
         });
-        let (points, ends) = found.unzip();
-        let series = Series::with_mark("", 0, Mark::Whiskers(ends), points);
-        Panel::new(name, Axis::new(metric.label, metric.unit), [series])
+        Panel::new(
+            name,
+            Axis::new(metric.label, metric.unit),
+            [Series::whiskers("", 0, found)],
+        )
     };
     let laws = results.laws.iter().map(|law| &law.name);
     Figure {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{LEFT_THE_ROAD, ended};
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
 use haptic_batch::experiment::{Drive, Experiment, Finding};
 use haptic_batch::left_by_themselves;
@@ -110,14 +110,13 @@ fn estimates(experiment: &Experiment) -> Figure {
         let k_hg = &d.noise_model.identification.parameters.k_hg;
         Some(((f64::from(d.participant), k_hg.estimate?), k_hg.interval_95?))
     });
-    let (points, ends) = found.unzip();
     let published = guided().filter_map(|d| {
         let k_hg = &d.paper.identification.parameters.k_hg;
         Some((f64::from(d.participant) + ASIDE, k_hg.optimum?))
     });
     let panel = Axis::new("K_hg", "-").panel([
         Series::dots("truth", 0, truth.collect()),
-        Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),
+        Series::whiskers("noise model, 95 % interval", 1, found),
         Series::dots("published method", 3, published.collect()),
     ]);
     Axis::counting("Participant").figure([panel])

@@ -5,7 +5,7 @@ use haptic_metrics::{DEFINITIONS, Definition};
 
 use super::super::place;
 use super::SHOWN;
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use crate::plot::{Axis, Figure, Panel, Series};
 
 /// The metrics that are shown, in order.
 fn shown() -> impl Iterator<Item = &'static Definition> {
@@ -46,17 +46,12 @@ pub(super) fn differences(results: &StudyResults) -> Figure {
     let ends = [0.5, pairs.len() as f64 + 0.5];
     let panels = shown().map(|metric| {
         let own = results.differences.iter().filter(|d| d.metric == metric.name);
-        let (mut points, mut intervals) = (Vec::new(), Vec::new());
-        for difference in own {
-            let row = pairs.iter().position(|name| *name == pair(difference));
-            let value = difference.mean.mean;
-            if let Some(row) = row {
-                points.push((place(row), value));
-                intervals.push(difference.mean.interval.unwrap_or([value; 2]));
-            }
-        }
+        let own = own.filter_map(|difference| {
+            let row = pairs.iter().position(|name| *name == pair(difference))?;
+            Some(((place(row), difference.mean.mean), difference.mean.ends()))
+        });
         let none = Series::line("no difference", 3, ends.map(|row| (row, 0.0)).to_vec());
-        let found = Series::with_mark("mean difference", 0, Mark::Whiskers(intervals), points);
+        let found = Series::whiskers("mean difference", 0, own);
         Axis::new(metric.label, metric.unit).panel([none, found])
     });
     let panels: Vec<Panel> = panels.collect();
