@@ -9,7 +9,7 @@ use haptic_core::controller::params::Params;
 use haptic_core::safety::modes::Mode;
 use haptic_sim::guidance::FloatLaw;
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::models::road::Course;
+use haptic_sim::models::road::{Course, LaneChoice};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 use haptic_sim::simulation::{Outcome, Run, Simulation, observe, simulate};
 
@@ -122,7 +122,7 @@ fn whole_curves_are_those_of_an_independent_program() {
 #[test]
 fn on_a_second_course_the_shipping_controller_drives_as_a_float_one() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/country-road.toml");
-    let course = haptic_batch::files::load_course(&path).unwrap();
+    let course = haptic_batch::files::load_lane(&path, &LaneChoice::default()).unwrap();
     for t_p in [0.1, 0.3, 0.5] {
         for condition in [Condition::High, Condition::Mid, Condition::Low] {
             let scenario = scenario(condition, t_p, Sensors::Exact).to_builder();

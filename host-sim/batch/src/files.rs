@@ -11,7 +11,7 @@ use toml::{Table, Value};
 /// Reads and checks a scenario file. A course file named in it is looked for beside the scenario.
 ///
 /// # Errors
-/// An unreadable file; as [`Scenario::from_toml`] and [`load_course`].
+/// An unreadable file; as [`Scenario::from_toml`] and [`load_lane`].
 pub fn load_scenario(path: &Path) -> Result<Scenario, InputError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let text = read(path)?;
@@ -37,14 +37,6 @@ pub fn open_course(path: &Path, lane: &LaneChoice) -> Result<Course, InputError>
         return Ok(Course::paper());
     }
     load_lane(path, lane)
-}
-
-/// Reads and checks a course file, in the lane that is sensible if it is one of OpenDRIVE.
-///
-/// # Errors
-/// As [`load_lane`].
-pub fn load_course(path: &Path) -> Result<Course, InputError> {
-    load_lane(path, &LaneChoice::default())
 }
 
 /// Reads and checks a course file: a lane of an OpenDRIVE file if its name ends with `.xodr`, else TOML.
@@ -221,7 +213,9 @@ pub(crate) mod tests {
 
     #[test]
     fn a_file_that_is_not_there_is_named() {
-        let missing = load_course(Path::new("no-such.toml")).unwrap_err().to_string();
+        let missing = load_lane(Path::new("no-such.toml"), &LaneChoice::default())
+            .unwrap_err()
+            .to_string();
         assert!(missing.starts_with("no-such.toml: "), "{missing}");
     }
 }

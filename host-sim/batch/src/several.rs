@@ -16,6 +16,8 @@ use statrs::function::erf::erfc;
 
 use haptic_analysis::identify::{Identification, Parameter};
 
+use crate::statistics::halved;
+
 /// Standard deviations that 95 % lie within.
 const NORMAL_95: f64 = 1.959_964;
 
@@ -198,19 +200,11 @@ fn largest(values: &[(f64, f64)]) -> f64 {
 }
 
 fn root(values: &[(f64, f64)], level: f64) -> f64 {
-    let (mut low, mut high) = (0.0, largest(values));
-    if weighed(values, 0.0).2 <= level {
+    let exceeds = |variance: f64| weighed(values, variance).2 > level;
+    if !exceeds(0.0) {
         return 0.0;
     }
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if weighed(values, middle).2 > level {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
+    halved([0.0, largest(values)], HALVINGS, exceeds)
 }
 
 /// The variance between drivers of the largest restricted likelihood, by bisection of its derivative.
@@ -226,16 +220,7 @@ fn restricted_variance(values: &[(f64, f64)]) -> f64 {
     if !rises(0.0) {
         return 0.0;
     }
-    let (mut low, mut high) = (0.0, largest(values));
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if rises(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
+    halved([0.0, largest(values)], HALVINGS, rises)
 }
 
 #[cfg(test)]

@@ -275,17 +275,18 @@ impl Serialize for Rate {
 
 /// By halving: the library's own inverse stops early.
 fn quantile(law: &ChiSquared, share: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
+    let (low, mut high) = (0.0, 1.0);
     while law.cdf(high) < share {
         high *= 2.0;
     }
-    for _ in 0..100 {
+    halved([low, high], 100, |x| law.cdf(x) < share)
+}
+
+/// Where something that holds below ends to hold, by so many halvings: the least value found at which it does not.
+pub(crate) fn halved([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..times {
         let middle = 0.5 * (low + high);
-        if law.cdf(middle) < share {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        *if holds(middle) { &mut low } else { &mut high } = middle;
     }
     high
 }
