@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_pil::PilError;
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
 
 use super::super::{BadInput, Outcome, print, print_json};
+use super::failed;
 use crate::processor::{self, ProcessorError};
 use crate::tester;
 
@@ -34,11 +34,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let measured = haptic_pil::cost::measure(&drive).and_then(|costs| Ok((costs, tester::flood()?)));
     let (mut costs, flood) = match measured {
         Ok(measured) => measured,
-        Err(error @ PilError::Missing(_)) => return Err(error.into()),
-        Err(error) => {
-            eprintln!("error: {error}");
-            return Ok(Outcome::Failed);
-        }
+        Err(error) => return failed(error),
     };
     costs.drives.extend(flood.costs);
     if arguments.json {

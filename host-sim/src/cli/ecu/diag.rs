@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Subcommand};
 use haptic_pil::PilError;
 use haptic_pil::diagnosis::{
@@ -13,7 +12,7 @@ use haptic_sim::input::{InputError, did_you_mean};
 use serde_json::{Map, Value, json};
 
 use super::super::{BadInput, Outcome, print, print_json, width};
-use super::keys;
+use super::{Bus, failed, keys};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -33,17 +32,6 @@ enum Command {
     Write(Write),
     /// All that can be read and written, and every code of a fault; asks no ECU
     Describe(Describe),
-}
-
-#[derive(Debug, Args)]
-struct Bus {
-    /// The way to the bus: a CAN interface (can0), the serial port of an SLCAN adapter (/dev/ttyUSB0), or
-    /// tcp:HOST:PORT
-    #[arg(long, value_name = "IFACE", value_parser = NonEmptyStringValueParser::new())]
-    can: String,
-    /// Print the result as one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -136,11 +124,7 @@ fn told<T>(
 ) -> Result<Outcome, BadInput> {
     match Tester::on(&bus.can).and_then(|mut tester| ask(&mut tester)) {
         Ok(answer) => show(answer).map(|()| Outcome::Good),
-        Err(error @ PilError::Missing(_)) => Err(error.into()),
-        Err(error) => {
-            eprintln!("error: {error}");
-            Ok(Outcome::Failed)
-        }
+        Err(error) => failed(error),
     }
 }
 

@@ -9,9 +9,22 @@ mod parameters;
 mod pil;
 mod run;
 
-use clap::Subcommand;
+use clap::builder::NonEmptyStringValueParser;
+use clap::{Args, Subcommand};
+use haptic_pil::PilError;
 
 use super::{BadInput, Outcome};
+
+#[derive(Debug, Args)]
+struct Bus {
+    /// The way to the bus: a CAN interface (can0), the serial port of an SLCAN adapter (/dev/ttyUSB0), or
+    /// tcp:HOST:PORT
+    #[arg(long, value_name = "IFACE", value_parser = NonEmptyStringValueParser::new())]
+    can: String,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
@@ -41,4 +54,13 @@ pub(super) fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Cost(arguments) => cost::run(arguments),
         Command::Bus(arguments) => bus::run(arguments),
     }
+}
+
+/// An ECU that cannot be built, started or heard is a check that failed, and a tool that is missing is bad usage.
+fn failed(error: PilError) -> Result<Outcome, BadInput> {
+    if matches!(error, PilError::Missing(_)) {
+        return Err(error.into());
+    }
+    eprintln!("error: {error}");
+    Ok(Outcome::Failed)
 }

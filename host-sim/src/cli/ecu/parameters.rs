@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::NonEmptyStringValueParser;
 use haptic_core::bus::messages::{Identity, ParameterStatus};
 use haptic_core::controller::params::{PARAMETERS, Parameter, Params};
 use haptic_pil::PilError;
@@ -12,7 +11,7 @@ use haptic_report::document::{Cell, Table};
 use serde_json::json;
 
 use super::super::{BadInput, Outcome, print, print_json, width};
-use super::keys;
+use super::{Bus, failed, keys};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -20,10 +19,8 @@ pub(in crate::cli) struct Arguments {
     /// says what it has
     #[arg(value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
-    /// The way to the bus: a CAN interface (can0), the serial port of an SLCAN adapter (/dev/ttyUSB0), or
-    /// tcp:HOST:PORT
-    #[arg(long, value_name = "IFACE", value_parser = NonEmptyStringValueParser::new())]
-    can: String,
+    #[command(flatten)]
+    bus: Bus,
     /// The number of the vehicle that the set is for, 1 to 1048575, such as the last six digits of its identification
     /// number. Stored with the set; an ECU that has another vehicle's set is left alone
     #[arg(long, value_name = "NUMBER", requires = "scenario", value_parser = clap::value_parser!(u32).range(1..=i64::from(Identity::VEHICLE_MAX)))]
@@ -34,9 +31,6 @@ pub(in crate::cli) struct Arguments {
     /// The ECU's keys, of `cargo xtask keys`: an ECU with keys takes a set with proofs alone
     #[arg(long, value_name = "keys.toml", requires = "scenario")]
     keys: Option<PathBuf>,
-    /// Print the result as one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -45,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         None => None,
     };
     let keys = arguments.keys.as_deref().map(keys::load).transpose()?;
-    let told = Product::on(&arguments.can).and_then(|mut product| {
+    let told = Product::on(&arguments.bus.can).and_then(|mut product| {
         product.prove(keys.as_ref().map(|(keys, _)| keys));
         let status = match &params {
             Some(params) => store(&mut product, params, arguments),
@@ -55,13 +49,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     });
     let (status, identity, in_use) = match told {
         Ok(told) => told,
-        Err(error @ PilError::Missing(_)) => return Err(error.into()),
-        Err(error) => {
-            eprintln!("error: {error}");
-            return Ok(Outcome::Failed);
-        }
+        Err(error) => return failed(error),
     };
-    if arguments.json {
+    if arguments.bus.json {
         print_json(&json!({
             "stored": status.stored,
             "sequence": status.sequence,

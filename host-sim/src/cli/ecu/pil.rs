@@ -7,11 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::processor::{self, ProcessorError};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
-use haptic_pil::{Channel, Machine, PilError, Target};
+use haptic_pil::{Channel, Machine, Target};
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
 
 use super::super::{BadInput, Outcome, print, print_json, progress};
+use super::failed;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -77,12 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             return Err(InputError::new(name, message).into());
         }
         Err(ProcessorError::Interrupted) => return Ok(Outcome::Interrupted),
-        Err(ProcessorError::Target(error @ PilError::Missing(_))) => return Err(error.into()),
-        // A target that cannot be built, started or heard is a comparison that failed, not bad usage.
-        Err(ProcessorError::Target(error)) => {
-            eprintln!("error: {error}");
-            return Ok(Outcome::Failed);
-        }
+        Err(ProcessorError::Target(error)) => return failed(error),
     };
     if arguments.json {
         print_json(&report)?;
