@@ -1,5 +1,7 @@
 //! One recorded drive, identified: what was found, and on request how the identified driver drives a course.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::RunRecord;
@@ -8,6 +10,7 @@ use crate::drivers::identified_driver;
 use crate::engine::{Watch, each};
 use crate::error::StudyError;
 use crate::several::{Difference, Population, differences, population};
+use crate::statistics::Confidence;
 use haptic_analysis::identify::{
     DriveLog, FixError, Identification, Options, Piece, Pieces, SingleTrack, Tracking, identify_and_track,
     identify_as_published, identify_in_pieces, identify_together_and_track, identify_with_noise_model, track,
@@ -64,6 +67,24 @@ pub struct IdentificationResults {
     /// The identified driver on the course asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drives_again: Option<RunRecord>,
+    /// How often the intervals of the report hold their parameters.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
+    /// Intervals of that level: of the drive, then of each piece. Those of 95 % stand beside each parameter.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub intervals: Vec<Intervals>,
+}
+
+/// Intervals by key; none where the data put no bound on a parameter, or contradict the model.
+pub type Intervals = BTreeMap<&'static str, Option<[f64; 2]>>;
+
+/// None of 95 %.
+fn intervals<'a>(all: impl Iterator<Item = &'a Identification>, level: Confidence) -> Vec<Intervals> {
+    let all = all
+        .filter(|_| !level.is_usual())
+        .map(|found| found.parameters.list());
+    all.map(|list| list.map(|(name, _, p)| (name, p.interval(level.normal()))).into())
+        .collect()
 }
 
 fn drive_of(name: &str, identification: Identification, tracking: Tracking) -> IdentifiedDrive {
@@ -74,6 +95,8 @@ fn drive_of(name: &str, identification: Identification, tracking: Tracking) -> I
             identification,
             pieces: None,
             drives_again: None,
+            level: Confidence::USUAL,
+            intervals: Vec::new(),
         },
     }
 }
@@ -129,6 +152,12 @@ pub fn identify_several(
 pub struct Drivers {
     /// Name of the drive and what was made of it.
     pub drivers: Vec<(String, Identification)>,
+    /// How often intervals hold.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
+    /// The intervals of each drive, where they are not those of 95 %, which stand beside each parameter.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub intervals: Vec<Intervals>,
     /// Names of the two who are compared: those of two whose models are not refuted, where there are just two; empty otherwise.
     pub compared: Vec<String>,
     /// Their differences, the first less the second; empty otherwise.
@@ -146,6 +175,7 @@ pub fn compare_drivers(
     logs: &[(String, DriveLog)],
     options: &Options,
     pieces: bool,
+    level: Confidence,
     watch: &Watch<'_>,
 ) -> Result<Drivers, StudyError> {
     let found = each(logs, watch, |(name, log)| {
@@ -165,16 +195,19 @@ pub fn compare_drivers(
     let (compared, differences, population) = match pair[..] {
         [first, second] => {
             let names = vec![first.0.clone(), second.0.clone()];
-            (names, differences(&first.1, &second.1), Vec::new())
+            (names, differences(&first.1, &second.1, level), Vec::new())
         }
         _ => {
             let fits: Vec<&Identification> = all.iter().map(|d| &d.1).collect();
-            (Vec::new(), Vec::new(), population(&fits))
+            (Vec::new(), Vec::new(), population(&fits, level))
         }
     };
+    let drivers: Vec<(String, Identification)> = found.into_iter().flatten().collect();
     Ok(Drivers {
+        level,
+        intervals: intervals(drivers.iter().map(|driver| &driver.1), level),
         compared,
-        drivers: found.into_iter().flatten().collect(),
+        drivers,
         differences,
         population,
     })
@@ -196,6 +229,15 @@ fn in_pieces(name: &str, log: &DriveLog, options: &Options) -> Vec<(String, Iden
 }
 
 impl IdentifiedDrive {
+    /// Takes intervals of another level. What is called identified stays so: that is a matter of 95 %.
+    pub fn hold_at(&mut self, level: Confidence) {
+        let results = &mut self.results;
+        let pieces = results.pieces.iter().flat_map(|found| &found.pieces);
+        let all = std::iter::once(&results.identification).chain(pieces.map(|piece| &piece.identification));
+        results.intervals = intervals(all, level);
+        results.level = level;
+    }
+
     /// Lets the identified driver, without remnant, drive `course` under the default guidance, or manually.
     ///
     /// # Errors

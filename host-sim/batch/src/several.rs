@@ -11,15 +11,12 @@
 use std::f64::consts::SQRT_2;
 
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use statrs::function::erf::erfc;
 
 use haptic_analysis::identify::{Identification, Parameter};
 
-use crate::statistics::halved;
-
-/// Standard deviations that 95 % lie within.
-const NORMAL_95: f64 = 1.959_964;
+use crate::statistics::{Confidence, Held, halved};
 
 /// One parameter of two drivers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,8 +29,9 @@ pub struct Difference {
     pub difference: f64,
     /// Its standard error.
     pub standard_error: f64,
-    /// Its 95 % interval, of this parameter alone.
-    pub interval_95: [f64; 2],
+    /// Its interval, of this parameter alone.
+    #[serde(flatten)]
+    pub interval: Held,
     /// How probable such a difference is between equal drivers, times what Holm's method (1979) takes for the number of
     /// parameters compared; 1 at most.
     pub p_holm: f64,
@@ -42,19 +40,19 @@ pub struct Difference {
 }
 
 /// What tells two drivers apart: the parameters that both records tell something of, identified or not.
-pub fn differences(first: &Identification, second: &Identification) -> Vec<Difference> {
+pub fn differences(first: &Identification, second: &Identification, level: Confidence) -> Vec<Difference> {
     let pairs = first.parameters.list().into_iter().zip(second.parameters.list());
     let mut found: Vec<Difference> = pairs
         .filter_map(|((parameter, unit, a), (_, _, b))| {
             let ((a, a_error), (b, b_error)) = (value_and_error(a)?, value_and_error(b)?);
             let (difference, standard_error) = (a - b, a_error.hypot(b_error));
-            let margin = NORMAL_95 * standard_error;
+            let margin = level.normal() * standard_error;
             Some(Difference {
                 parameter,
                 unit,
                 difference,
                 standard_error,
-                interval_95: [difference - margin, difference + margin],
+                interval: Held::new("interval", level, [difference - margin, difference + margin]),
                 p_holm: erfc(difference.abs() / standard_error / SQRT_2),
                 real: false,
             })
@@ -98,18 +96,20 @@ pub struct Population {
     pub drivers: usize,
     /// Mean of the group.
     pub mean: f64,
-    /// 95 % interval of the mean.
-    pub mean_interval_95: [f64; 2],
+    /// Interval of the mean.
+    #[serde(flatten)]
+    pub mean_interval: Held,
     /// Standard deviation between drivers.
     pub spread: f64,
-    /// 95 % interval of the spread.
-    pub spread_interval_95: [f64; 2],
+    /// Interval of the spread.
+    #[serde(flatten)]
+    pub spread_interval: Held,
     /// Each driver's value given the group, in the order given; none where the record tells nothing of it.
     pub each: Vec<Option<f64>>,
 }
 
 /// What the group is like, for each parameter that the records of at least three drivers tell something of.
-pub fn population(found: &[&Identification]) -> Vec<Population> {
+pub fn population(found: &[&Identification], level: Confidence) -> Vec<Population> {
     let Some(first) = found.first() else {
         return Vec::new();
     };
@@ -124,15 +124,19 @@ pub fn population(found: &[&Identification]) -> Vec<Population> {
                 .map(|f| value_and_error(f.parameters.list()[i].2))
                 .collect();
             let known: Vec<(f64, f64)> = all.iter().copied().flatten().collect();
-            let effects = RandomEffects::from_values(&known)?;
+            let effects = RandomEffects::from_values(&known, level)?;
             Some(Population {
                 parameter,
                 unit,
                 drivers: known.len(),
                 mean: effects.mean,
-                mean_interval_95: effects.mean_interval_95,
+                mean_interval: Held::new("mean_interval", level, effects.mean_interval),
                 spread: effects.variance.sqrt(),
-                spread_interval_95: effects.variance_interval_95.map(f64::sqrt),
+                spread_interval: Held::new(
+                    "spread_interval",
+                    level,
+                    effects.variance_interval.map(f64::sqrt),
+                ),
                 each: all.iter().map(|x| x.map(|(y, s)| effects.shrunk(y, s))).collect(),
             })
         })
@@ -143,9 +147,9 @@ pub fn population(found: &[&Identification]) -> Vec<Population> {
 #[derive(Debug, Clone, Copy)]
 struct RandomEffects {
     mean: f64,
-    mean_interval_95: [f64; 2],
+    mean_interval: [f64; 2],
     variance: f64,
-    variance_interval_95: [f64; 2],
+    variance_interval: [f64; 2],
 }
 
 /// Fewest drivers that have a spread.
@@ -154,7 +158,7 @@ const FEWEST: usize = 3;
 const HALVINGS: usize = 200;
 
 impl RandomEffects {
-    fn from_values(values: &[(f64, f64)]) -> Option<Self> {
+    fn from_values(values: &[(f64, f64)], level: Confidence) -> Option<Self> {
         if values.len() < FEWEST {
             return None;
         }
@@ -162,15 +166,15 @@ impl RandomEffects {
         let variance = restricted_variance(values);
         let (mean, weight, q) = weighed(values, variance);
         let error = ((q / freedom).max(1.0) / weight).sqrt();
-        let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
+        let t = level.student(freedom);
         let chi = ChiSquared::new(freedom).ok()?;
         // Q falls as the variance grows.
-        let at = |level: f64| root(values, chi.inverse_cdf(level));
+        let at = |share: f64| root(values, chi.inverse_cdf(share));
         Some(Self {
             mean,
-            mean_interval_95: [mean - t * error, mean + t * error],
+            mean_interval: [mean - t * error, mean + t * error],
             variance,
-            variance_interval_95: [at(0.975), at(0.025)],
+            variance_interval: [at(level.upper()), at(level.lower())],
         })
     }
 
@@ -247,6 +251,7 @@ mod tests {
             on_bound: false,
             fixed: false,
             optimum: Some(0.5),
+            errors: None,
         };
         assert_eq!(value_and_error(&p), Some((0.5, 0.2)));
         assert_eq!(value_and_error(&Parameter { on_bound: true, ..p }), None);
@@ -272,10 +277,10 @@ mod tests {
             0.5325, 0.0714,
         ];
         let values: Vec<(f64, f64)> = y.into_iter().zip(v.map(f64::sqrt)).collect();
-        let found = RandomEffects::from_values(&values).unwrap();
+        let found = RandomEffects::from_values(&values, Confidence::USUAL).unwrap();
         assert!((found.variance - 0.3132).abs() < 1e-3, "{found:?}");
         assert!((found.mean + 0.7145).abs() < 1e-3, "{found:?}");
-        let [low, high] = found.variance_interval_95;
+        let [low, high] = found.variance_interval;
         assert!(
             (low - 0.1197).abs() < 2e-3 && (high - 1.1115).abs() < 5e-3,
             "{found:?}"
@@ -288,15 +293,19 @@ mod tests {
         let y = [28.0, 8.0, -3.0, 7.0, -1.0, 1.0, 18.0, 12.0];
         let s = [15.0, 10.0, 16.0, 11.0, 9.0, 11.0, 10.0, 18.0];
         let values: Vec<(f64, f64)> = y.into_iter().zip(s).collect();
-        let found = RandomEffects::from_values(&values).unwrap();
+        let found = RandomEffects::from_values(&values, Confidence::USUAL).unwrap();
         assert_eq!(found.variance, 0.0);
         assert!((found.mean - 7.69).abs() < 0.01, "{found:?}");
         // numpy and SciPy: Q is 0.672 times its freedom, which would narrow the interval; with a factor of 1 it is 7.686 -+ 2.3646 * 4.072.
-        let [low, high] = found.mean_interval_95;
+        let [low, high] = found.mean_interval;
         assert!(
             (low + 1.9429).abs() < 1e-3 && (high - 17.3142).abs() < 1e-3,
             "{found:?}"
         );
+        // At 99 % Student's quantile of 7 degrees of freedom is 3.4995 in tables.
+        let level = Confidence::new(0.99).unwrap();
+        let [low, high] = RandomEffects::from_values(&values, level).unwrap().mean_interval;
+        assert!(((high - low) / (17.3142 + 1.9429) - 3.4995 / 2.3646).abs() < 1e-3);
         assert!((found.shrunk(28.0, 15.0) - found.mean).abs() < 1e-12);
     }
 }

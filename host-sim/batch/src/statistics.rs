@@ -69,12 +69,12 @@ impl Confidence {
     }
 
     /// What is left out at the upper end, seen from below: 0.975 of 95 %.
-    fn upper(self) -> f64 {
+    pub(crate) fn upper(self) -> f64 {
         0.5 + 0.5 * self.0
     }
 
     /// What is left out at the lower end: 0.025 of 95 %, and no 0.02500000000000002.
-    fn lower(self) -> f64 {
+    pub(crate) fn lower(self) -> f64 {
         (1e12 * (1.0 - self.upper())).round() / 1e12
     }
 
@@ -86,7 +86,8 @@ impl Confidence {
     }
 
     /// How many standard deviations an interval of a normal distribution reaches.
-    pub(crate) fn normal(self) -> f64 {
+    #[must_use]
+    pub fn normal(self) -> f64 {
         // The digits of tables, to the last bit as the campaign has them.
         if self.0 == 0.95 {
             return Z_95;
@@ -115,6 +116,29 @@ impl Confidence {
 impl Serialize for Confidence {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.0.serialize(serializer)
+    }
+}
+
+/// An interval of a level, whose field in JSON has the level in its name: `interval_95`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    name: &'static str,
+    level: Confidence,
+    /// Its ends.
+    pub ends: [f64; 2],
+}
+
+impl Held {
+    pub(crate) fn new(name: &'static str, level: Confidence, ends: [f64; 2]) -> Self {
+        Self { name, level, ends }
+    }
+}
+
+impl Serialize for Held {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_map(Some(1))?;
+        fields.serialize_entry(&format!("{}_{}", self.name, self.level), &self.ends)?;
+        fields.end()
     }
 }
 

@@ -64,6 +64,42 @@ pub(super) struct RecordingArguments {
     pub(super) vehicle: Option<PathBuf>,
 }
 
+/// What is known of the driver before a fit.
+#[derive(Debug, Args)]
+pub(super) struct FitArguments {
+    /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
+    /// missing
+    #[arg(long)]
+    manual: bool,
+    /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms; by
+    /// how much a column is late, s: t_h_late, t_d_late; the driver's own line, m: line_offset and line_bend, that in a left bend of
+    /// 300 m at 60 km/h; of a torsion bar: wheel_inertia, kg.m2, wheel_damping, N.m.s/rad, and bar_stiffness, N.m/rad, where the angle is
+    /// the column's); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
+    #[arg(long, value_name = "NAME=VALUE")]
+    fix: Vec<String>,
+    /// The column has a power assist that is not in guidance_torque_nm: it turns the wheel with the driver, so that the torques on the
+    /// column do not tell whether driver_torque_nm is recorded too small
+    #[arg(long)]
+    assisted: bool,
+    /// Estimate what is otherwise taken as known: k_nms, t_nms, t_h_late, t_d_late, in a range if one is given, such as
+    /// t_nms=0.06..0.15; may be repeated
+    #[arg(long, value_name = "NAME[=LOW..HIGH]")]
+    estimate: Vec<String>,
+}
+
+impl FitArguments {
+    /// The options of a fit to what is read so.
+    pub(super) fn options(&self, reading: &ReadingArguments) -> Result<Options, BadInput> {
+        let mut options = Options::given(self.manual, &self.fix)?;
+        options.assisted = self.assisted;
+        for what in &self.estimate {
+            options.estimate(what)?;
+        }
+        reading.choose(&mut options)?;
+        Ok(options)
+    }
+}
+
 impl ReadingArguments {
     /// Takes stretches and gaps into the options of a fit.
     pub fn choose(&self, options: &mut Options) -> Result<(), BadInput> {

@@ -48,8 +48,8 @@ pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use recording::{Layout, Mapping, Signals, Table, of_bytes, of_table, open as open_mapped};
 pub use result::{
-    AtTNms, Combination, Correlation, Identification, InputCorrelation, OwnLine, Parameter, Parameters,
-    Refutation, Remnant, Start, Torques, Traces, Whiteness,
+    AtTNms, Combination, Correlation, Errors, Identification, InputCorrelation, OwnLine, Parameter,
+    Parameters, Refutation, Remnant, Start, Torques, Traces, Whiteness,
 };
 pub use search::{Bounds, Optimum, Quadratic, Termination, minimise};
 pub use signals::Muscle;

@@ -67,6 +67,47 @@ pub struct Parameter {
     pub fixed: bool,
     /// Where the search ended; none if the parameter is not part of the method's model.
     pub optimum: Option<f64>,
+    /// What an interval of any level is made of; none where there is no interval.
+    #[serde(skip)]
+    pub errors: Option<Errors>,
+}
+
+/// How an optimum errs: by its deviation about where the search would have ended without bounds, and about what else draws it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    optimum: f64,
+    pull: f64,
+    deviation: f64,
+    drawn: f64,
+    bounds: Bounds,
+    /// The deviation if t_nms is as assumed.
+    as_assumed: Option<f64>,
+    /// What optimum and interval are multiplied by.
+    factor: f64,
+}
+
+impl Errors {
+    /// The interval that reaches so many standard deviations of a normal distribution, and holds the one that is true if t_nms is as
+    /// assumed.
+    fn interval(&self, deviations: f64) -> [f64; 2] {
+        let holding = |deviation: f64, drawn: f64| {
+            let margin = deviations * deviation;
+            let towards_optimum = margin.hypot(self.pull);
+            let (below, above) = if self.pull > 0.0 {
+                (towards_optimum, margin)
+            } else {
+                (margin, towards_optimum)
+            };
+            let unbounded = self.optimum + self.pull;
+            let ends = [unbounded - below, unbounded + above].map(|end| end + drawn);
+            let holding = [ends[0].min(self.optimum), ends[1].max(self.optimum)];
+            holding.map(|end| end.clamp(self.bounds.low, self.bounds.high))
+        };
+        let [low, high] = holding(self.deviation, self.drawn);
+        let narrow = self.as_assumed.map(|deviation| holding(deviation, 0.0));
+        let held = narrow.map_or([low, high], |[least, most]| [low.min(least), high.max(most)]);
+        held.map(|end| end * self.factor)
+    }
 }
 
 impl Parameter {
@@ -79,7 +120,16 @@ impl Parameter {
         on_bound: false,
         fixed: false,
         optimum: None,
+        errors: None,
     };
+
+    /// The interval that reaches so many standard deviations of a normal distribution, cut as [`Self::interval_95`] is.
+    #[must_use]
+    pub fn interval(&self, deviations: f64) -> Option<[f64; 2]> {
+        // What was given has an interval without width, whatever the level.
+        self.errors
+            .map_or(self.interval_95, |errors| Some(errors.interval(deviations)))
+    }
 
     pub(crate) fn fixed(value: f64) -> Self {
         Self {
@@ -107,24 +157,24 @@ impl Parameter {
         if !variance.is_finite() || !pull.is_finite() {
             return not;
         }
-        let margin = STANDARD_NORMAL_95 * variance.max(0.0).sqrt();
         // The mean square of what the estimate misses: the variance about where the record draws it, and the way there.
         let standard_error = (variance.max(0.0) + drawn * drawn).sqrt();
         let identified = STANDARD_NORMAL_95 * standard_error <= 0.5 * WIDEST_INTERVAL_SHARE * variation_width;
-        let towards_optimum = margin.hypot(pull);
-        let (below, above) = if pull > 0.0 {
-            (towards_optimum, margin)
-        } else {
-            (margin, towards_optimum)
+        let errors = Errors {
+            optimum,
+            pull,
+            deviation: variance.max(0.0).sqrt(),
+            drawn,
+            bounds,
+            as_assumed: None,
+            factor: 1.0,
         };
-        let unbounded = optimum + pull;
-        let ends = [unbounded - below, unbounded + above].map(|end| end + drawn);
-        let holding = [ends[0].min(optimum), ends[1].max(optimum)];
         Self {
             estimate: identified.then_some(optimum),
             standard_error: Some(standard_error),
-            interval_95: Some(holding.map(|end| end.clamp(bounds.low, bounds.high))),
+            interval_95: Some(errors.interval(STANDARD_NORMAL_95)),
             identified,
+            errors: Some(errors),
             ..not
         }
     }
@@ -145,6 +195,10 @@ impl Parameter {
             standard_error: self.standard_error.map(|x| x * factor.abs()),
             interval_95: self.interval_95.map(|i| i.map(|x| x * factor)),
             optimum: self.optimum.map(|x| x * factor),
+            errors: self.errors.map(|errors| Errors {
+                factor: errors.factor * factor,
+                ..errors
+            }),
             ..self
         }
     }
@@ -202,9 +256,9 @@ impl Parameters {
     pub(crate) fn hold(&mut self, at_t_nms: &AtTNms) {
         let names = self.list().map(|(name, ..)| name);
         for (name, p) in names.into_iter().zip(self.list_mut()) {
-            let narrow = at_t_nms.intervals_95.iter().find(|own| own.0 == name);
-            if let (Some(wide), Some((_, narrow))) = (&mut p.interval_95, narrow) {
-                *wide = [wide[0].min(narrow[0]), wide[1].max(narrow[1])];
+            if let (Some(wide), Some(narrow)) = (&mut p.errors, at_t_nms.errors(name)) {
+                wide.as_assumed = Some(narrow.deviation);
+                p.interval_95 = Some(wide.interval(STANDARD_NORMAL_95));
             }
         }
     }
@@ -258,6 +312,21 @@ pub struct AtTNms {
     pub t_nms_s: f64,
     /// By key.
     pub intervals_95: Vec<(&'static str, [f64; 2])>,
+    /// What an interval of any level is made of, by key.
+    #[serde(skip)]
+    pub errors: Vec<(&'static str, Errors)>,
+}
+
+impl AtTNms {
+    fn errors(&self, name: &str) -> Option<&Errors> {
+        self.errors.iter().find(|own| own.0 == name).map(|own| &own.1)
+    }
+
+    /// The interval of a parameter that reaches so many standard deviations of a normal distribution.
+    #[must_use]
+    pub fn interval(&self, name: &str, deviations: f64) -> Option<[f64; 2]> {
+        Some(self.errors(name)?.interval(deviations))
+    }
 }
 
 /// The line that the driver takes beside the target line, to the left where positive. A camera whose e_y has an offset looks the
@@ -468,5 +537,24 @@ mod tests {
         let p = Parameter::estimated(0.5, 0.0, 0.01, 0.0, Bounds::new(0.0, 1.0), 1.0);
         let [low, high] = p.interval_95.unwrap();
         assert!((low - 0.304).abs() < 1e-4 && (high - 0.696).abs() < 1e-4);
+    }
+
+    /// Like the last, with the 2.5758 of tables for 99 %: 1.2 - 0.1 sqrt(4 + 2.5758^2) = 1.2 - 0.32612, and 0.5 -+ 0.25758. What is true if
+    /// t_nms is as assumed stays inside: 0.5 -+ 2 * 0.2, cut at 1.
+    #[test]
+    fn an_interval_of_another_level_reaches_as_many_deviations() {
+        let p = Parameter::estimated(1.0, 0.2, 0.01, 0.0, Bounds::new(0.0, 1.0), 1.0);
+        let [low, high] = p.interval(2.5758).unwrap();
+        assert!((low - 0.873_88).abs() < 1e-4 && high == 1.0, "{low} {high}");
+        let mut p = Parameter::estimated(0.5, 0.0, 0.01, 0.0, Bounds::new(0.0, 1.0), 1.0);
+        let [low, high] = p.scaled(2.0).interval(2.5758).unwrap();
+        assert!((low - 0.484_84).abs() < 1e-4 && (high - 1.515_16).abs() < 1e-4);
+        p.errors.as_mut().unwrap().as_assumed = Some(0.2);
+        assert_eq!(p.interval(2.0), Some([0.5 - 0.4, 0.5 + 0.4]));
+        assert_eq!(Parameter::fixed(0.3).interval(2.5758), Some([0.3, 0.3]));
+        assert_eq!(
+            Parameter::not_identified(0.3, Bounds::FREE).interval(2.5758),
+            None
+        );
     }
 }

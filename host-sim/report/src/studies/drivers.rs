@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::place;
 use crate::document::{Block, Cell, Report, Section, Table};
-use crate::plot::{Axis, Figure, Mark, Series};
+use crate::plot::{Axis, Figure, Series};
+use haptic_analysis::identify::Identification;
 use haptic_batch::identify::Drivers;
 use haptic_batch::several::{Difference, Population, value_and_error};
 
@@ -15,8 +16,9 @@ const SHOWN: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
 /// The document of the drivers.
 pub fn report(found: &Drivers) -> Report {
     let caption = format!(
-        "Each driver with the 95 % interval of that driver's own drive; the dashed lines are the ends of the interval of the group's mean. Drives \
+        "Each driver with the {} % interval of that driver's own drive; the dashed lines are the ends of the interval of the group's mean. Drives \
              too imprecise to name a value count with what they tell. {}",
+        found.level,
         gaps(found)
     );
     let mut blocks = vec![Block::figure("drivers", figure(found), caption)];
@@ -37,7 +39,7 @@ fn tables(found: &Drivers) -> Vec<Table> {
         out.push(differences(found));
     }
     if !found.population.is_empty() {
-        out.push(population(&found.population, &gaps(found)));
+        out.push(population(found));
     }
     out
 }
@@ -85,15 +87,16 @@ fn differences(found: &Drivers) -> Table {
         }
         _ => "The first driver less the second.".into(),
     };
+    let from = format!("{} % from", found.level);
     let row = |d: &Difference| {
-        let [low, high] = Cell::ends(d.interval_95, 4);
+        let [low, high] = Cell::ends(d.interval.ends, 4);
         let verdict = if d.real { "they differ" } else { "not told apart" };
         [
             ("", Cell::text(d.parameter)),
             ("Unit", Cell::text(d.unit)),
             ("Difference", number(d.difference)),
             ("Standard error", number(d.standard_error)),
-            ("95 % from", low),
+            (&*from, low),
             ("to", high),
             ("p (Holm)", number(d.p_holm)),
             ("Verdict", Cell::text(verdict)),
@@ -109,23 +112,26 @@ fn differences(found: &Drivers) -> Table {
     )
 }
 
-fn population(found: &[Population], gaps: &str) -> Table {
+fn population(found: &Drivers) -> Table {
+    let (from, gaps) = (format!("{} % from", found.level), gaps(found));
     let row = |p: &Population| {
+        let [low, high] = Cell::ends(p.mean_interval.ends, 4);
+        let [least, most] = Cell::ends(p.spread_interval.ends, 4);
         [
             ("", Cell::text(p.parameter)),
             ("Unit", Cell::text(p.unit)),
             ("Drivers", Cell::count(p.drivers)),
             ("Mean", number(p.mean)),
-            ("95 % from", number(p.mean_interval_95[0])),
-            ("to", number(p.mean_interval_95[1])),
+            (&*from, low),
+            ("to", high),
             ("Spread", number(p.spread)),
-            ("95 % from", number(p.spread_interval_95[0])),
-            ("to", number(p.spread_interval_95[1])),
+            (&*from, least),
+            ("to", most),
         ]
     };
     Table::of_rows(
         format!("The group: its mean, and the standard deviation between drivers (random effects). {gaps}"),
-        found.iter().map(row),
+        found.population.iter().map(row),
     )
 }
 
@@ -148,34 +154,35 @@ fn figure(found: &Drivers) -> Figure {
     let panels = SHOWN.iter().map(|&wanted| {
         let mut series = Vec::new();
         if let Some(p) = found.population.iter().find(|p| p.parameter == wanted) {
-            for (label, at) in ["mean of the group: its 95 % interval", ""]
-                .into_iter()
-                .zip(p.mean_interval_95)
-            {
+            let label = format!("mean of the group: its {} % interval", found.level);
+            for (label, at) in [&*label, ""].into_iter().zip(p.mean_interval.ends) {
                 series.push(Series::line(label, 2, ends.map(|row| (row, at)).to_vec()));
             }
         }
-        let (mut points, mut intervals, mut unit) =
-            ([const { Vec::new() }; 2], [const { Vec::new() }; 2], "-");
-        for (i, (_, fit)) in found.drivers.iter().enumerate() {
-            let list = fit.parameters.list();
-            let named = list.iter().find(|l| l.0 == wanted);
-            unit = named.map_or(unit, |l| l.1);
-            let Some(p) = named.map(|l| l.2) else { continue };
-            if let (Some((x, _)), Some(interval)) = (value_and_error(p), p.interval_95) {
-                let kind = usize::from(!p.identified);
-                points[kind].push((place(i), x));
-                intervals[kind].push(interval);
+        let of = |fit: &Identification| {
+            fit.parameters
+                .list()
+                .into_iter()
+                .find(|l| l.0 == wanted)
+                .map(|l| (l.1, *l.2))
+        };
+        let known = |identified: bool| {
+            found.drivers.iter().enumerate().filter_map(move |(i, (_, fit))| {
+                let (_, p) = of(fit).filter(|(_, p)| p.identified == identified)?;
+                Some((
+                    (place(i), value_and_error(&p)?.0),
+                    p.interval(found.level.normal())?,
+                ))
+            })
+        };
+        for (label, style, identified) in [("own drive", 1, true), ("own drive, not identified", 3, false)] {
+            let own = Series::whiskers(label, style, known(identified));
+            if !own.points.is_empty() {
+                series.push(own);
             }
         }
-        let labels = ["own drive", "own drive, not identified"];
-        for (kind, (points, intervals)) in points.into_iter().zip(intervals).enumerate() {
-            if !points.is_empty() {
-                let mark = Mark::Whiskers(intervals);
-                series.push(Series::with_mark(labels[kind], [1, 3][kind], mark, points));
-            }
-        }
-        Axis::new(wanted, unit).panel(series)
+        let unit = found.drivers.iter().find_map(|(_, fit)| Some(of(fit)?.0));
+        Axis::new(wanted, unit.unwrap_or("-")).panel(series)
     });
     let panels: Vec<_> = panels.collect();
     Figure::of_rows(names, panels)

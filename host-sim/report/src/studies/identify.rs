@@ -11,12 +11,13 @@ use haptic_analysis::identify::{
     Combination, History, Identification, InputCorrelation, LeftOut, Parameter, Reason, Refutation, Torques,
     autocorrelation,
 };
+use haptic_batch::Confidence;
 use haptic_batch::identify::IdentifiedDrive;
 
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
 
-/// Highest value of the delay's profile that is drawn: so that the level of 95 %, 3.84, is seen well above the axis.
+/// Highest value of the delay's profile that is drawn, at least: so that the level of 95 %, 3.84, is seen well above the axis.
 const HIGHEST: f64 = 15.0;
 
 /// What a line or an area breaks at: a place between rows that are no neighbours, from whose values nothing is drawn.
@@ -40,85 +41,83 @@ fn broken_line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
     Series::through(label, style, &x, &y)
 }
 
-/// Minus twice the log likelihood over t_p for the arm as assumed, up to where it no longer matters, with the level of 95 %, and
-/// the intervals for that arm and for any; none if t_p was given.
-fn delay_profile(found: &Identification) -> Option<Figure> {
-    let profile = &found.delay_profile;
+/// Minus twice the log likelihood over t_p for the arm as assumed, up to where it no longer matters, with the level of the intervals,
+/// and those for that arm and for any; none if t_p was given.
+fn delay_profile(found: &Identification, level: Confidence) -> Option<Figure> {
+    let (profile, deviations) = (&found.delay_profile, level.normal());
+    let chi_squared = deviations.powi(2);
+    let highest = HIGHEST.max(1.2 * chi_squared);
     let mut x = Vec::new();
     let mut y = Vec::new();
     for (k, &[t_p, d]) in profile.iter().enumerate() {
         // Where the line leaves the picture, and where it comes back.
         if let Some([before, was]) = k.checked_sub(1).map(|k| profile[k])
-            && (was > HIGHEST) != (d > HIGHEST)
+            && (was > highest) != (d > highest)
         {
-            x.push(before + (t_p - before) * (HIGHEST - was) / (d - was));
-            y.push(HIGHEST);
+            x.push(before + (t_p - before) * (highest - was) / (d - was));
+            y.push(highest);
         }
         x.push(t_p);
-        y.push(if d > HIGHEST { f64::NAN } else { d });
+        y.push(if d > highest { f64::NAN } else { d });
     }
     let ends = [*x.first()?, *x.last()?];
     let mut series = Vec::new();
     let assumed = found.at_t_nms.as_ref();
-    let narrow = assumed.and_then(|a| a.intervals_95.iter().find(|i| i.0 == "t_p"));
+    let narrow = assumed.and_then(|a| a.interval("t_p", deviations));
     let any = match assumed {
-        Some(_) => "95 % interval, t_nms not known",
-        None => "95 % interval",
+        Some(_) => format!("{level} % interval, t_nms not known"),
+        None => format!("{level} % interval"),
     };
-    if let Some(interval) = found.parameters.t_p.interval_95 {
-        series.push(Series::interval(any, 5, &interval, &[[0.0, HIGHEST]; 2]));
+    if let Some(interval) = found.parameters.t_p.interval(deviations) {
+        series.push(Series::interval(&any, 5, &interval, &[[0.0, highest]; 2]));
     }
-    if let Some((_, [low, high])) = narrow {
-        let ends = [
-            (*low, 0.0),
-            (*low, HIGHEST),
-            (*low, f64::NAN),
-            (*high, 0.0),
-            (*high, HIGHEST),
-        ];
-        series.push(Series::line("95 % interval, t_nms as assumed", 2, ends.to_vec()));
+    if let Some([low, high]) = narrow {
+        let (x, y) = (
+            [low, low, low, high, high],
+            [0.0, highest, f64::NAN, 0.0, highest],
+        );
+        let label = format!("{level} % interval, t_nms as assumed");
+        series.push(Series::through(&label, 2, &x, &y));
     }
     let profile = match assumed {
         Some(_) => "profile, t_nms as assumed",
         None => "profile",
     };
     series.push(Series::through(profile, 0, &x, &y));
-    series.push(Series::through("level of 95 %", 1, &ends, &[3.84, 3.84]));
-    let y = Axis::new("-2 log L above optimum", "-").within(0.0, HIGHEST);
+    let label = format!("level of {level} %");
+    series.push(Series::through(&label, 1, &ends, &[chi_squared; 2]));
+    let y = Axis::new("-2 log L above optimum", "-").within(0.0, highest);
     Some(Axis::new("t_p", "s").figure([y.panel(series)]))
 }
 
 /// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed; none if there
 /// are no intervals.
-fn intervals(found: &Identification) -> Option<Figure> {
+fn intervals(found: &Identification, level: Confidence) -> Option<Figure> {
     let known = |(name, _, p): (&'static str, _, &Parameter)| {
         let at = p.optimum.filter(|&at| !p.fixed && at.abs() > 1e-9)?;
-        Some((name, at, p.interval_95?))
+        Some((name, at, p.interval(level.normal())?))
     };
     let list: Vec<_> = found.parameters.list().into_iter().filter_map(known).collect();
     if list.is_empty() {
         return None;
     }
-    let (mut wide, mut narrow) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
-    for (i, (name, at, interval)) in list.iter().enumerate() {
-        let place = place(i);
-        wide.0.push((place - 0.12, 1.0));
-        wide.1.push(interval.map(|x| x / at));
-        let of = found.at_t_nms.as_ref();
-        if let Some((_, ends)) = of.and_then(|a| a.intervals_95.iter().find(|n| n.0 == *name)) {
-            narrow.0.push((place + 0.12, 1.0));
-            narrow.1.push(ends.map(|x| x / at));
-        }
-    }
+    let share =
+        |i: usize, aside: f64, at: f64, ends: [f64; 2]| ((place(i) + aside, 1.0), ends.map(|x| x / at));
+    let listed = list.iter().enumerate();
+    let wide = listed
+        .clone()
+        .map(|(i, &(_, at, interval))| share(i, -0.12, at, interval));
+    let narrow = listed.filter_map(|(i, &(name, at, _))| {
+        let assumed = found.at_t_nms.as_ref()?.interval(name, level.normal())?;
+        Some(share(i, 0.12, at, assumed))
+    });
     let label = match is_published(found) {
-        true => "interval as published",
-        false => "95 % interval",
+        true => "interval as published".into(),
+        false => format!("{level} % interval"),
     };
-    let mut series = vec![Series::with_mark(label, 0, Mark::Whiskers(wide.1), wide.0)];
-    if !narrow.0.is_empty() {
-        let mark = Mark::Whiskers(narrow.1);
-        series.push(Series::with_mark("if t_nms is as assumed", 1, mark, narrow.0));
-    }
+    let narrow = Series::whiskers("if t_nms is as assumed", 1, narrow);
+    let series = [Series::whiskers(&label, 0, wide), narrow];
+    let series = series.into_iter().filter(|series| !series.points.is_empty());
     let panel = Axis::new("Share of the estimate", "-").panel(series);
     Some(Figure::of_rows(list.iter().map(|l| l.0), [panel]))
 }
@@ -204,19 +203,22 @@ fn followed(drive: &IdentifiedDrive) -> Figure {
 }
 
 /// What is known of the driver, and what it rests on.
-fn verdict_blocks(found: &Identification) -> Vec<Block> {
+fn verdict_blocks(found: &Identification, level: Confidence) -> Vec<Block> {
     let sentences = refutations(found)
         .into_iter()
-        .chain(verdicts(found))
-        .chain(own_line(found));
+        .chain(verdicts(found, level))
+        .chain(own_line(found, level));
     let mut verdict: Vec<Block> = sentences.map(Block::Text).collect();
-    verdict.push(Block::Table(parameters(found)));
-    let shown = |name, figure: Option<Figure>, caption| figure.map(|f| Block::figure(name, f, caption));
+    verdict.push(Block::Table(parameters(found, level)));
     let beside = match is_published(found) {
-        true => {
-            "The intervals as the published method has them: 95 % only where its residuals do not refute them."
+        true => format!(
+            "The intervals as the published method has them: {level} % only where its residuals do not refute them."
+        ),
+        false => {
+            format!(
+                "The {level} % intervals, and what they would be if K_nms and t_nms were what is assumed."
+            )
         }
-        false => "The 95 % intervals, and what they would be if K_nms and t_nms were what is assumed.",
     };
     let valley = match found.at_t_nms {
         Some(_) => {
@@ -227,8 +229,8 @@ fn verdict_blocks(found: &Identification) -> Vec<Block> {
             "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known."
         }
     };
-    verdict.extend(shown("intervals", intervals(found), beside));
-    verdict.extend(shown("delay_profile", delay_profile(found), valley));
+    verdict.extend(intervals(found, level).map(|f| Block::figure("intervals", f, beside)));
+    verdict.extend(delay_profile(found, level).map(|f| Block::figure("delay_profile", f, valley)));
     if !found.assumed.is_empty() {
         let assumed = found.assumed.join("; ");
         let text = format!("Assumed, for the log cannot show it: {assumed}.");
@@ -260,15 +262,17 @@ pub fn report(drive: &IdentifiedDrive) -> Report {
     let followed = Block::figure("over_time", followed(drive), by_filter);
     let in_pieces = drive.results.pieces.as_ref().zip(pieces::figure(drive));
     let in_pieces = in_pieces.map(|(pieces, figure)| {
-        let figure = Block::figure("pieces", figure, pieces::CAPTION);
-        let tables = pieces::tables(pieces).into_iter().map(Block::Table);
+        let figure = Block::figure("pieces", figure, pieces::caption(drive.results.level));
+        let tables = pieces::tables(pieces, drive.results.level)
+            .into_iter()
+            .map(Block::Table);
         Section::new("Pieces", [figure].into_iter().chain(tables).collect())
     });
     let table = |heading, table| Section::new(heading, vec![Block::Table(table)]);
     let in_the_log = in_the_log(found).map(|found| table("In the log", found));
     let again = drives_again(drive).map(|again| table("The identified driver on the course", again));
     let always = [
-        Section::new("Parameters", verdict_blocks(found)),
+        Section::new("Parameters", verdict_blocks(found, drive.results.level)),
         Section::new("Fit", fit),
         Section::new("Residuals", left_over),
         Section::new("Over time", vec![followed]),
@@ -302,7 +306,7 @@ fn refutations(found: &Identification) -> Vec<String> {
 }
 
 /// What is known of each parameter that a torque can tell, in words.
-fn verdicts(found: &Identification) -> Vec<String> {
+fn verdicts(found: &Identification, level: Confidence) -> Vec<String> {
     let meaning = |name: &str| match name {
         "gain_1" => "torque per lateral error",
         "gain_2" => "torque per integral of the lateral error",
@@ -323,8 +327,8 @@ fn verdicts(found: &Identification) -> Vec<String> {
             return Some(format!("{name}, {what}, was given: {:.4}{unit}.", p.estimate?));
         }
         let within = p
-            .interval_95
-            .map(|[low, high]| format!("between {low:.4} and {high:.4}{unit} (95 %)"));
+            .interval(level.normal())
+            .map(|[low, high]| format!("between {low:.4} and {high:.4}{unit} ({level} %)"));
         Some(match (p.estimate, within) {
             (Some(x), Some(within)) => format!("{name}, {what}, is {x:.4}{unit}: {within}."),
             (None, Some(_)) if is_refuted_as_published(found) => {
@@ -350,14 +354,21 @@ fn verdicts(found: &Identification) -> Vec<String> {
 }
 
 /// The line that the driver takes, in words; nothing where the model is refuted.
-fn own_line(found: &Identification) -> Option<String> {
+fn own_line(found: &Identification, level: Confidence) -> Option<String> {
     let line = found.line.filter(|_| found.refuted.is_empty())?;
     let place = |p: &Parameter| {
-        let [low, high] = p.interval_95?;
+        let [low, high] = p.interval(level.normal())?;
         let side = |x: f64| format!("{:.3} m {}", x.abs(), if x < 0.0 { "right" } else { "left" });
         Some(match p.estimate {
-            Some(x) => format!("{} of the target line ({low:.3} to {high:.3} m, 95 %)", side(x)),
-            None => format!("anywhere between {} and {} of it (95 %)", side(low), side(high)),
+            Some(x) => format!(
+                "{} of the target line ({low:.3} to {high:.3} m, {level} %)",
+                side(x)
+            ),
+            None => format!(
+                "anywhere between {} and {} of it ({level} %)",
+                side(low),
+                side(high)
+            ),
         })
     };
     let added = match line.bend.estimate {
@@ -424,10 +435,10 @@ fn number(value: impl Into<Option<f64>>) -> Cell {
 }
 
 /// Every parameter with its interval and verdict.
-fn parameters(found: &Identification) -> Table {
+fn parameters(found: &Identification, level: Confidence) -> Table {
     let narrow = |name: &str| {
         let at = found.at_t_nms.as_ref().filter(|_| found.refuted.is_empty())?;
-        at.intervals_95.iter().find(|i| i.0 == name).map(|i| i.1)
+        at.interval(name, level.normal())
     };
     let published = is_published(found);
     let caption = match published {
@@ -437,9 +448,9 @@ fn parameters(found: &Identification) -> Table {
         false => "An estimate is given only where the data identify the parameter.",
     };
     let from = if published {
-        "As published: from"
+        "As published: from".into()
     } else {
-        "95 % from"
+        format!("{level} % from")
     };
     let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
     let line = found.line.as_ref().filter(|_| found.refuted.is_empty());
@@ -458,7 +469,7 @@ fn parameters(found: &Identification) -> Table {
             (_, false, false) => "not identified",
         };
         let estimate = if published { p.optimum } else { p.estimate };
-        let [low, high] = Cell::ends(p.interval_95, 4);
+        let [low, high] = Cell::ends(p.interval(level.normal()), 4);
         let [narrow_low, narrow_high] = Cell::ends(narrow(name), 4);
         [
             ("", Cell::text(name)),
@@ -466,7 +477,7 @@ fn parameters(found: &Identification) -> Table {
             ("Verdict", Cell::text(verdict)),
             ("Estimate", number(estimate)),
             ("Standard error", number(p.standard_error)),
-            (from, low),
+            (&*from, low),
             ("to", high),
             ("Arm known: from", narrow_low),
             ("to", narrow_high),

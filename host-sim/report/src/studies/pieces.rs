@@ -1,15 +1,19 @@
 //! A driver in pieces: the parameters of each stretch, the instants between them, and a figure that shows both.
 
 use haptic_analysis::identify::{Change, History, Parameter, Piece, Pieces};
+use haptic_batch::Confidence;
 use haptic_batch::identify::IdentifiedDrive;
 
 use crate::document::{Cell, Table};
 use crate::plot::{Axis, Band, Figure, Series, Shade};
 
 /// What the figure shows.
-pub(super) const CAPTION: &str = "Each piece with its 95 % intervals, and the same drive followed by the Kalman filter. A band \
-                                  without a line: not identified in that piece. Shaded: where a change lies (95 %), which is of \
-                                  no piece.";
+pub(super) fn caption(level: Confidence) -> String {
+    format!(
+        "Each piece with its {level} % intervals, and the same drive followed by the Kalman filter. A band without a line: not identified \
+         in that piece. Shaded: where a change lies (95 %), which is of no piece."
+    )
+}
 
 /// What a torque can tell, in order.
 const SHOWN: [&str; 5] = ["k_hg", "gain_1", "gain_2", "gain_3", "t_p"];
@@ -20,22 +24,21 @@ fn parameter<'a>(piece: &'a Piece, name: &str) -> Option<&'a Parameter> {
 }
 
 /// Every piece and every change.
-pub(super) fn tables(pieces: &Pieces) -> Vec<Table> {
-    let mut out = vec![each(&pieces.pieces)];
+pub(super) fn tables(pieces: &Pieces, level: Confidence) -> Vec<Table> {
+    let mut out = vec![each(&pieces.pieces, level)];
     if !pieces.changes.is_empty() {
         out.push(changes(&pieces.changes));
     }
     out
 }
 
-fn each(pieces: &[Piece]) -> Table {
+fn each(pieces: &[Piece], level: Confidence) -> Table {
     let row = |piece: &Piece| {
         let mut cells = vec![Cell::number(piece.from_s, 1), Cell::number(piece.to_s, 1)];
         for name in SHOWN {
             let p = parameter(piece, name);
-
             cells.push(Cell::number(p.and_then(|p| p.estimate), 4));
-            cells.extend(Cell::ends(p.and_then(|p| p.interval_95), 4));
+            cells.extend(Cell::ends(p.and_then(|p| p.interval(level.normal())), 4));
         }
         let told = if piece.shows_such_changes { "yes" } else { "no" };
         cells.push(Cell::text(told));
@@ -45,7 +48,7 @@ fn each(pieces: &[Piece]) -> Table {
     };
     let mut columns = vec!["From (s)".to_owned(), "to (s)".to_owned()];
     for name in SHOWN {
-        columns.extend([name.to_owned(), "95 % from".to_owned(), "to".to_owned()]);
+        columns.extend([name.to_owned(), format!("{level} % from"), "to".to_owned()]);
     }
     columns.extend(["Shows such changes", "Refuted"].map(String::from));
     Table::new(
@@ -83,6 +86,7 @@ fn changes(changes: &[Change]) -> Table {
 pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
     let pieces = drive.results.pieces.as_ref()?;
     let tracking = &drive.tracking;
+    let of_a_piece = format!("{} % interval of a piece", drive.results.level);
     let histories: [(&str, &str, &History); 5] = [
         ("k_hg", "-", &tracking.k_hg),
         ("gain_1", "N.m/m", &tracking.gain[0]),
@@ -94,14 +98,15 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
         let (mut x, mut ends, mut middles) = (Vec::new(), Vec::new(), Vec::new());
         for piece in &pieces.pieces {
             let p = parameter(piece, name);
-            let interval = p.and_then(|p| p.interval_95).unwrap_or([f64::NAN; 2]);
+            let interval = p.and_then(|p| p.interval(drive.results.level.normal()));
+            let interval = interval.unwrap_or([f64::NAN; 2]);
             let estimate = p.and_then(|p| p.estimate).unwrap_or(f64::NAN);
             x.extend([piece.from_s, piece.to_s, piece.to_s]);
             ends.extend([interval, interval, [f64::NAN; 2]]);
             middles.extend([estimate, estimate, f64::NAN]);
         }
         Axis::new(name, unit).panel([
-            Series::interval("95 % interval of a piece", 5, &x, &ends),
+            Series::interval(&of_a_piece, 5, &x, &ends),
             Series::through("followed", 4, &tracking.time_s, &history.estimate),
             Series::through("identified in a piece", 1, &x, &middles),
         ])

@@ -421,16 +421,20 @@ impl Problem<'_> {
     /// The 95 % intervals if K_nms and t_nms are what is assumed, from the standard errors that hold then; at a bound by the
     /// likelihood ratio, as the wider ones.
     pub(super) fn as_assumed(&self, p: &[f64], errors: &DMatrix<f64>, pull: &DVector<f64>) -> AtTNms {
-        let interval = |i: usize| {
+        let errors = |i: usize| {
             let (bounds, width) = (self.bounds[i], VARIATION_WIDTHS[i]);
-            Parameter::estimated(p[i], pull[i], errors[(i, i)], 0.0, bounds, width).interval_95
+            let found = Parameter::estimated(p[i], pull[i], errors[(i, i)], 0.0, bounds, width);
+            Some((NAMES[i]?, found.interval_95?, found.errors?))
         };
+        let free = (0..=T_P).filter(|&i| self.is_free(i));
+        let found: Vec<_> = free.filter_map(errors).collect();
         AtTNms {
             t_nms_s: p[T_NMS],
-            intervals_95: (0..=T_P)
-                .filter(|&i| self.is_free(i))
-                .filter_map(|i| Some((NAMES[i]?, interval(i)?)))
+            intervals_95: found
+                .iter()
+                .map(|&(name, interval, _)| (name, interval))
                 .collect(),
+            errors: found.iter().map(|&(name, _, errors)| (name, errors)).collect(),
         }
     }
 

@@ -302,6 +302,7 @@ mod tests {
             interval_95: Some([estimate - 2.0 * error, estimate + 2.0 * error]),
             on_bound: false,
             fixed: false,
+            errors: None,
         };
         let of = |name, estimate, error| value(name, found(estimate, error), [2.0, 9.0]).unwrap();
         assert!(!of("gain_1", 2.06, 0.012).wrong && !of("gain_1", 2.06, 0.012).held);

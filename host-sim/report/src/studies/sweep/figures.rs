@@ -2,7 +2,7 @@
 
 use super::super::place;
 use super::words::{OWN_UNIT, by_weight, label, lower, metric, share};
-use crate::plot::{Axis, Figure, Mark, Marker, Series};
+use crate::plot::{Axis, Figure, Marker, Series};
 use haptic_batch::sweep::{Compared, Drives, Effect, SobolIndex, Summary};
 
 /// Fields that are drawn: of more, those that matter most.
@@ -44,18 +44,21 @@ pub(super) fn influence(summary: &Summary) -> Option<Named> {
     } else {
         let own = || summary.sobol.iter().filter(|index| index.metric == summary.judge);
         let of = |label: &str, style, aside: f64, value: fn(&SobolIndex) -> [f64; 2]| {
-            let found = own().map(value).enumerate();
-            let (points, ends) = found
-                .map(|(i, [x, se])| ((place(i) + aside, x), [x - 1.96 * se, x + 1.96 * se]))
-                .unzip();
-            Series::with_mark(label, style, Mark::Whiskers(ends), points)
+            let half = |error: f64| summary.level.normal() * error;
+            let ends = |(i, [x, error]): (usize, [f64; 2])| {
+                ((place(i) + aside, x), [x - half(error), x + half(error)])
+            };
+            Series::whiskers(label, style, own().map(value).enumerate().map(ends))
         };
         let panel = axis.panel([
             of("first order", 1, -0.1, |i| i.first),
             of("total", 2, 0.1, |i| i.total),
         ]);
         (
-            format!("Sobol indices of {judge} with their standard errors."),
+            format!(
+                "Sobol indices of {judge} with {} % intervals of their standard errors.",
+                summary.level
+            ),
             Figure::of_rows(own().map(|index| &index.field), [panel]),
         )
     };
@@ -123,8 +126,7 @@ fn series(summary: &Summary, effect: &Effect, places: &[f64], joined: bool, know
             let value = value?;
             Some(((x, value), interval.unwrap_or([value; 2])))
         };
-        let (points, ends): (Vec<_>, Vec<_>) = values.into_iter().filter_map(known).unzip();
-        let line = Series::with_mark(label, style, Mark::Whiskers(ends), points);
+        let line = Series::whiskers(label, style, values.into_iter().filter_map(known));
         if joined { line.joined() } else { line }
     };
     let levels = || places.iter().copied().zip(&effect.levels);
