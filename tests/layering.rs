@@ -473,6 +473,21 @@ fn every_crate_keeps_within_its_budget_of_lines() {
     assert!(without.is_empty(), "no budget: {without:?}");
 }
 
+#[test]
+fn the_documents_keep_within_their_budget_of_words() {
+    let words = lines::words(&root().join("docs")).unwrap();
+    assert!(
+        words <= lines::WORDS,
+        "{words} words in docs/: {} at most",
+        lines::WORDS
+    );
+    // Bars and dashes are no words; a number is one.
+    assert_eq!(
+        lines::of_document("# A title\n\n| a | 0.5 \u{b1} 1 |\n|---|---|\n- `b` c.\n"),
+        7
+    );
+}
+
 /// Counted by hand: what is left out stands beside what is not.
 #[test]
 fn lines_are_counted_without_tests_comments_and_blanks() {
