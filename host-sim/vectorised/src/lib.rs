@@ -146,6 +146,8 @@ pub fn run_batch(scenarios: &[Scenario], options: Options, mut on: impl FnMut(us
         }
     }
     waiting.reverse();
+    // The longest first: the last ones, beside which lanes go empty, are then short.
+    waiting.sort_by(|(_, a), (_, b)| a.duration_s().total_cmp(&b.duration_s()));
     let whole = waiting
         .iter()
         .map(|(_, scenario)| (scenario.driver().t_p / STEP_S) as usize);

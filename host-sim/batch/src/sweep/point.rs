@@ -3,7 +3,7 @@
 use haptic_sim::input::{InputError, in_range};
 use haptic_sim::scenario::Scenario;
 use haptic_sim::seeds::{self, Stream};
-use toml::Value;
+use toml::{Table, Value};
 
 use super::axis::Kind;
 use super::{Design, DesignPoint, MOST_DRIVES, SLICES, Sweep, value};
@@ -53,8 +53,8 @@ impl Sweep {
         }
     }
 
-    /// The text of a drive's scenario.
-    fn scenario_text(&self, point: &DesignPoint) -> Result<String, StudyError> {
+    /// The fields of a drive's scenario.
+    fn fields(&self, point: &DesignPoint) -> Result<Table, StudyError> {
         let mut table = self.scenario.clone();
         table.insert("seed".into(), Value::Integer(point.seed as i64));
         let columns = || self.axes().flat_map(|axis| &axis.columns);
@@ -78,7 +78,7 @@ impl Sweep {
                 value::put(&mut table, path, applied.clone()).map_err(|e| format!("vary.{e}"))?;
             }
         }
-        toml::to_string(&table).map_err(|e| InputError::new(&self.name, e).into())
+        Ok(table)
     }
 
     /// The scenario of a drive.
@@ -87,10 +87,10 @@ impl Sweep {
     /// A value out of range, with the drive's number and what is varied in it; an instant behind the end of the run.
     pub fn scenario(&self, point: &DesignPoint) -> Result<Scenario, InputError> {
         let scenario = self
-            .scenario_text(point)
+            .fields(point)
             .map_err(|e| InputError::new(&self.name, e))
-            .and_then(|text| {
-                Scenario::from_toml(&self.name, &text, |course, _| {
+            .and_then(|table| {
+                Scenario::from_table(&self.name, table, |course, _| {
                     let known = self.courses.get(course).cloned();
                     known.ok_or_else(|| InputError::new(&self.name, format!("course: no course {course:?}")))
                 })

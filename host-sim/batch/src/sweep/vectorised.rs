@@ -16,8 +16,14 @@ impl Sweep {
     /// As [`Sweep::scenario`]; a drive that differs from the shipping ECU's.
     pub fn run_chunk(&self, number: u64) -> Result<Chunk, InputError> {
         let drives = self.drives_of(number);
-        let scenarios = drives.clone().map(|drive| self.scenario(&self.point(drive)));
-        let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
+        let mut scenarios: Vec<Scenario> = Vec::new();
+        for drive in drives.clone() {
+            let mut scenario = self.scenario(&self.point(drive))?;
+            if let Some(before) = scenarios.last() {
+                scenario.share_road(before);
+            }
+            scenarios.push(scenario);
+        }
         let rows = self.run_batched(drives.start, &scenarios)?;
         let rows = rows.into_iter().zip(&scenarios);
         let rows = rows.map(|(row, scenario)| row.map_or_else(|| self.run_alone(scenario), Ok));

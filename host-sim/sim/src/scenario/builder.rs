@@ -8,7 +8,7 @@ use super::{
     ScenarioValues, Sensors, Speed, file,
 };
 use crate::fields::Fields;
-use crate::input::{InputError, RangeError};
+use crate::input::{InputError, RangeError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
@@ -117,7 +117,7 @@ impl ScenarioBuilder {
         text: &str,
         course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
-        file::parse(name, text, course)
+        file::values(name, parse_toml(name, text)?, course)
     }
 
     /// The road.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::guidance_file::GuidanceInFile;
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors, Speed};
 use crate::fields::{Field, Fields, InFile, Range};
-use crate::input::{InputError, parse_toml};
+use crate::input::InputError;
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
@@ -16,13 +16,12 @@ use crate::models::tolerances::Tolerances;
 use crate::models::torsion_bar::{AssistParameters, ColumnParameters};
 use crate::models::vehicle::VehicleParameters;
 
-/// Parses a scenario; only its course is checked.
-pub(super) fn parse(
+/// What a scenario's file says; only its course is checked.
+pub(super) fn values(
     name: &str,
-    text: &str,
+    file: ScenarioFile,
     course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
 ) -> Result<ScenarioBuilder, InputError> {
-    let file: ScenarioFile = parse_toml(name, text)?;
     let choice = LaneChoice {
         road: file.road.clone(),
         lane: file.lane,
@@ -253,7 +252,7 @@ impl InlineCourse {
 
 #[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
-struct ScenarioFile {
+pub(super) struct ScenarioFile {
     course: CourseField,
     #[serde(skip_serializing_if = "Option::is_none")]
     road: Option<String>,

@@ -17,6 +17,7 @@ mod values;
 
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
+use toml::Table;
 
 pub use builder::{ScenarioBuilder, ScenarioError};
 pub use condition::{Condition, Sensors};
@@ -25,7 +26,7 @@ pub use file::{FieldsOf, TABLES, fields_of, unit_of};
 pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_M_PER_S, SPEED_M_PER_S, Speed, SpeedProfile};
 pub use values::{GuidanceParameters, ScenarioValues};
 
-use crate::input::{InputError, in_range};
+use crate::input::{InputError, in_range, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::nonlinear::WorldParameters;
@@ -98,6 +99,29 @@ impl Scenario {
     ) -> Result<Self, InputError> {
         let builder = ScenarioBuilder::from_toml(name, text, course)?;
         builder.build().map_err(|e| InputError::new(name, e))
+    }
+
+    /// A scenario from what its file says, as [`Scenario::from_toml`] gives it from the text.
+    ///
+    /// # Errors
+    /// As [`Scenario::from_toml`].
+    pub fn from_table(
+        name: &str,
+        table: Table,
+        course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
+    ) -> Result<Self, InputError> {
+        // Of a table that is refused the reader of texts says why.
+        let read = table.clone().try_into();
+        let file = read.or_else(|_| parse_toml(name, &table.to_string()))?;
+        let builder = file::values(name, file, course)?;
+        builder.build().map_err(|e| InputError::new(name, e))
+    }
+
+    /// Takes another scenario's road where it is the same, so that it is made once.
+    pub fn share_road(&mut self, with: &Self) {
+        if self.values.course == with.values.course {
+            self.values.course = with.values.course.clone();
+        }
     }
 
     /// The scenario as the text of a file that needs no other file: read again it is the same scenario, bit for bit. A

@@ -2,8 +2,15 @@
 
 use super::*;
 
+/// The scenario of a text, which is also that of the table that the text says.
 fn parse(text: &str) -> Result<Scenario, InputError> {
-    Scenario::from_toml("s.toml", text, |name, _| Err(InputError::new(name, "not there")))
+    let course = |name: &str, _: &LaneChoice| Err(InputError::new(name, "not there"));
+    let parsed = Scenario::from_toml("s.toml", text, course);
+    if let Ok(table) = toml::from_str(text) {
+        let read = Scenario::from_table("s.toml", table, course);
+        assert_eq!(read.ok(), parsed.clone().ok(), "{text}");
+    }
+    parsed
 }
 
 #[test]
