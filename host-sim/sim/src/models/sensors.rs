@@ -2,14 +2,10 @@
 //!
 //! Not here: noise, latency of the camera (the paper gives none), and the resolution of the bus.
 
-use super::STEPS_PER_SECOND;
-
 /// Resolution of the driver torque sensor, N.m.
 pub const TORQUE_RESOLUTION_NM: f64 = 0.005;
 /// Resolution of the wheel angle sensor, deg.
 pub const ANGLE_RESOLUTION_DEG: f64 = 0.1;
-/// Lane errors per second.
-pub const CAMERA_RATE_HZ: u32 = 120;
 
 /// The driver torque as its sensor gives it, N.m.
 pub fn torque_nm(truth_nm: f64) -> f64 {
@@ -25,8 +21,8 @@ pub fn wheel_angle_rad(truth_rad: f64) -> f64 {
 /// not before it, so 9, 8 and 8 ms apart in turn, beginning at step 0.
 #[inline]
 pub fn camera_looks(step: u32) -> bool {
-    // 25 steps hold three pictures; due times passed since the step before leave a small remainder.
-    step % 25 * CAMERA_RATE_HZ % STEPS_PER_SECOND < CAMERA_RATE_HZ
+    // Three pictures in 25 steps: due at 0, 8.3 and 16.7 ms.
+    matches!(step % 25, 0 | 9 | 17)
 }
 
 #[cfg(test)]
