@@ -48,13 +48,14 @@ mod _native {
     #[pymodule_export]
     use crate::sweep::Sweep;
 
-    /// Identifiers of what the ECU hears, from the one list of messages.
+    /// The package's version, and identifiers of what the ECU hears, from the one list of messages.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         let ids = MESSAGES
             .iter()
             .map(|message| message.id)
             .filter(|id| is_input(*id));
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("INPUT_IDS", PyFrozenSet::new(module.py(), ids)?)
     }
 }

@@ -31,6 +31,12 @@ def known(given):
     return {spelling(name) for name in str(caught.value).split("There are ")[1].split(", ")}
 
 
+def test_the_version_is_that_of_the_workspace():
+    cargo = Path(__file__).parents[3] / "Cargo.toml"
+    version = next(line.split('"')[1] for line in cargo.read_text().splitlines() if line.startswith("version = "))
+    assert hg.__version__ == version
+
+
 def test_the_keywords_of_the_stubs_are_the_fields_of_a_scenario():
     top = fields("ScenarioFields")
     assert {spelling(name) for name in top} == known({"no_such": 1})

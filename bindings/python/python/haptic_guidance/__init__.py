@@ -25,6 +25,7 @@ from ._native import (
     Scenario,
     Simulation,
     Step,
+    __version__,
     metric_definitions,
     parameters,
 )
@@ -55,6 +56,7 @@ __all__ = [
     "Step",
     "SweepResult",
     "UnknownNameError",
+    "__version__",
     "compare",
     "evaluate",
     "experiment",

@@ -332,6 +332,8 @@ class Ecu:
     def step(self, t_us: int) -> Step: ...
     def clone(self) -> Ecu: ...
 
+__version__: str
+"""The version of this package."""
 INPUT_IDS: frozenset[int]
 """Identifiers of what the ECU hears."""
 
