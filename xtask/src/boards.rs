@@ -263,8 +263,35 @@ fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
     figures.extend(activity.figures(", driver activity"));
     figures.push(figure("worst step, any example", "instructions", worst, 1));
     if board == Board::Mps2An386 {
+        figures.extend(under_faults(built)?);
         figures.extend(with_keys(built)?);
     }
+    Ok(figures)
+}
+
+/// The worst step of any row of the fault campaign: of those whose frames a bus can carry, and of all.
+fn under_faults(built: Built) -> Result<Vec<Figure>> {
+    let text = tool::output(&mut tool::command(&built.worst_step()?.to_string_lossy()))?;
+    let report: Value = serde_json::from_str(&text).context("bench/worst_step.rs")?;
+    let rows = report["rows"].as_array().context("worst_step counted no row")?;
+    let mut figures = Vec::new();
+    for (key, name) in [
+        ("worst", "worst step, any fault"),
+        (
+            "with_any_frames",
+            "worst step, any fault, more frames than a bus carries",
+        ),
+    ] {
+        let worst = rows.iter().rev().max_by_key(|row| row[key].as_u64());
+        let worst = worst.context("worst_step counted no row")?;
+        println!("{name}: {}, of {} rows", worst["row"], rows.len());
+        let value = worst[key].as_u64().unwrap_or_default();
+        figures.push(figure(name, "instructions", value, 1));
+    }
+    println!(
+        "not among them, because they change the ECU itself: {}",
+        report["left_out"]
+    );
     Ok(figures)
 }
 

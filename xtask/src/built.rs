@@ -42,6 +42,18 @@ impl Built {
         Ok(self.daily().package("haptic-evidence")?.join(EVIDENCE))
     }
 
+    /// The program that counts the steps of the fault campaign, likewise.
+    pub(crate) fn worst_step(self) -> Result<PathBuf> {
+        match self {
+            Self::ForTests => drop(self.package("haptic-campaign")?),
+            Self::Daily | Self::ToShip => {
+                let build = "build -q --release -p haptic-campaign --example worst_step";
+                run(cargo().args(build.split(' ')))?;
+            }
+        }
+        Ok(root().join("target/release/examples/worst_step"))
+    }
+
     fn daily(self) -> Self {
         match self {
             Self::ForTests => self,

@@ -15,8 +15,7 @@ use haptic_core::bus::Frame;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use super::bytes::FAULT;
-use super::bytes::Status;
+use super::bytes::{FAULT, Status};
 use super::campaign::{self, Campaign};
 use super::injection::{Injection, Inside};
 use super::invariants::{InvariantChecker, Violation};
@@ -24,6 +23,7 @@ use super::table::{Expect, FaultCase};
 use super::trial::World;
 use super::trial_record::{EcuTrace, Tick};
 use haptic_pil::PilError;
+use haptic_pil::qemu::instructions;
 use haptic_pil::stepped::Stepped;
 
 /// A bit flips after at least so many ticks, and at most twice as many.
@@ -31,6 +31,8 @@ const BEFORE: usize = 50;
 /// Ticks after a flip in which the target is watched, and those that it is still watched once it has stopped.
 const WATCHED: usize = 150;
 const STOPPED: usize = 50;
+/// Frames that a bus of 500 kbit/s carries from one step to the next at most: 222 us each, and one may have begun before.
+const CARRIED: usize = 5;
 
 /// Runs each row with `seeds` in QEMU; `done` is called after every run.
 ///
@@ -42,8 +44,7 @@ pub fn run(
     seeds: std::ops::Range<u64>,
     mut done: impl FnMut(),
 ) -> Result<Campaign, PilError> {
-    let mut in_lockstep = None;
-    let mut with_memory = None;
+    let (mut in_lockstep, mut with_memory) = (None, None);
     let mut results = Vec::new();
     for row in rows {
         let flips = flips(row);
@@ -64,7 +65,7 @@ pub fn run(
                     outcome.cycles = flipped.cycles;
                     outcome.seen = outcome.reaction_ms.is_some();
                 } else {
-                    outcome.failure = compare(target, &trace)?;
+                    outcome.failure = compare(target, &trace)?.0;
                 }
             }
             outcomes.push(outcome);
@@ -101,16 +102,38 @@ fn send(target: &mut Stepped, tick: &Tick) -> Result<(), PilError> {
     target.tick(tick.now, &frames)
 }
 
-/// The first tick whose answer is not the host's.
-fn compare(target: &mut Stepped, trace: &EcuTrace) -> Result<Option<Violation>, PilError> {
+/// Instructions of the worst step of a run, by a target that counts them ([`Stepped::counting`]): of every step, and of those for which
+/// a bus carries the frames. `None` if it does not answer as the host does: the fault changes the ECU itself, which the target
+/// leaves whole.
+///
+/// # Errors
+/// A target that stops answering.
+pub fn worst_steps(
+    target: &mut Stepped,
+    world: &World,
+    row: &FaultCase,
+    seed: u64,
+) -> Result<Option<[u32; 2]>, PilError> {
+    let trace = world.trial(row, seed, true).1;
+    let compared = trace.map(|trace| compare(target, &trace)).transpose()?;
+    let alike = compared.filter(|(violation, _)| violation.is_none());
+    Ok(alike.map(|(_, cycles)| cycles.map(instructions)))
+}
+
+/// The first tick whose answer is not the host's, and the cycles of the worst steps.
+fn compare(target: &mut Stepped, trace: &EcuTrace) -> Result<(Option<Violation>, [u32; 2]), PilError> {
     target.begin(&trace.params, trace.start)?;
     // All of them before the first answer: what comes back waits on our side of the pipe.
     for tick in &trace.ticks {
         send(target, tick)?;
     }
-    let mut violation = None;
+    let (mut violation, mut worst) = (None, [0; 2]);
     for tick in &trace.ticks {
         let answer = target.answer()?;
+        let carried = usize::from(tick.frames.len() <= CARRIED);
+        worst[..=carried]
+            .iter_mut()
+            .for_each(|worst| *worst = target.cost().cycles.max(*worst));
         if answer != tick.answer && violation.is_none() {
             violation = Some(Violation {
                 step: tick.step,
@@ -118,7 +141,7 @@ fn compare(target: &mut Stepped, trace: &EcuTrace) -> Result<Option<Violation>, 
             });
         }
     }
-    Ok(violation)
+    Ok((violation, worst))
 }
 
 /// What came of a flipped bit.

@@ -86,6 +86,14 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
             "worst of any example: a torsion bar",
             "mps2-an386 worst step, any example",
         ),
+        (
+            "worst of any [fault](reference/fault-campaign.md): `yaw-error-min`",
+            "mps2-an386 worst step, any fault",
+        ),
+        (
+            "with more frames than a bus carries: `ten-times-the-rate`",
+            "mps2-an386 worst step, any fault, more frames than a bus carries",
+        ),
     ] {
         let count = golden(key);
         has(porting, format!("| {row} | {count} | {} |", share(&count)));
