@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde_json::{Map, Value};
 
-use crate::{callgrind, tool, venv};
+use crate::{callgrind, dist, tool, venv};
 
 /// Runs of a loop within a round; the fastest of them counts.
 const REPEAT: &str = "5";
@@ -19,7 +19,7 @@ const REPEAT: &str = "5";
 const SAME_DRIVE: [&str; 8] = ["--t-p", "0.1", "--k-d", "3", "--k-hg", "0.5", "--repeat", REPEAT];
 
 /// What is compared: the key of `--json` before `_ratio`, what is shown, and which program is held against which.
-const RATIOS: [(&str, &str, &str, &str); 10] = [
+const RATIOS: [(&str, &str, &str, &str); 11] = [
     (
         "like_for_like",
         "our world with C's kind of ECU, over C",
@@ -28,7 +28,7 @@ const RATIOS: [(&str, &str, &str, &str); 10] = [
     ),
     (
         "like_for_like_native",
-        "  the same, both for this processor (-march=native)",
+        "our world with C's kind of ECU, over C, both for this processor (-march=native)",
         "ours_light_native",
         "c_native",
     ),
@@ -39,10 +39,10 @@ const RATIOS: [(&str, &str, &str, &str); 10] = [
         "c_with_ours",
     ),
     ("lanes", "lanes with every check, over C", "lanes", "c"),
-    ("lanes_avx2", "  the same with AVX2 at most", "lanes_avx2", "c"),
+    ("lanes_avx2", "lanes with AVX2 at most, over C", "lanes_avx2", "c"),
     (
         "lanes_portable",
-        "  the same with what every machine has",
+        "lanes with what every machine has, over C",
         "lanes_portable",
         "c",
     ),
@@ -65,6 +65,14 @@ const RATIOS: [(&str, &str, &str, &str); 10] = [
         "jax",
     ),
     ("whole", "the whole of ours over the whole of C", "ours", "c"),
+    ("numpy", "ours over NumPy and SciPy", "ours", "numpy"),
+];
+
+/// The page that shows the figures, between two marks.
+const PAGE: &str = "docs/explanation/speed.md";
+const MARKS: [&str; 2] = [
+    "<!-- measured: cargo xtask bench speed --write -->\n",
+    "<!-- measured ends -->",
 ];
 
 /// What `cargo xtask bench speed` is asked for.
@@ -73,6 +81,9 @@ pub(crate) struct Options {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
+    /// Write the figures into docs/explanation/speed.md, with this processor and the commit
+    #[arg(long, conflicts_with = "json")]
+    write: bool,
     /// Rounds, each with every program once.
     #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
@@ -115,20 +126,32 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         println!("{}", serde_json::to_string_pretty(&figures)?);
         return Ok(());
     }
-    println!("{}", processor());
-    println!("one core, times real time (median of {} rounds)", options.rounds);
+    let mut table = "| one core of its processor | times real time |\n|---|---|\n".to_owned();
     for program in &programs {
-        println!(
-            "  {:<58}{:>10.0}",
-            program.shown,
-            median(speeds[program.key].clone())
-        );
+        let speed = median(speeds[program.key].clone());
+        table += &format!("| {} | {speed:.0} |\n", program.shown);
     }
-    println!("ours over the peer, above 1: ours is faster");
+    table += "\n| above 1: ours is faster | ratio |\n|---|---|\n";
     for (_, shown, over, under) in RATIOS {
-        println!("  {shown:<58}{:>10.2}", ratio(over, under));
+        table += &format!("| {} | {:.2} |\n", shown, ratio(over, under));
+    }
+    let (rounds, at) = (options.rounds, dist::commit());
+    table += &format!("\n{}; medians of {rounds} rounds, at commit {at}.\n", processor());
+    print!("{table}");
+    if options.write {
+        let page = tool::root().join(PAGE);
+        let text = std::fs::read_to_string(&page).context(PAGE)?;
+        std::fs::write(page, between(&text, &table)?).context(PAGE)?;
     }
     Ok(())
+}
+
+/// A page with a table between its marks.
+fn between(page: &str, table: &str) -> Result<String> {
+    let missing = || format!("{PAGE}: {} is missing", MARKS.concat());
+    let (before, rest) = page.split_once(MARKS[0]).with_context(missing)?;
+    let (_, after) = rest.split_once(MARKS[1]).with_context(missing)?;
+    Ok([before, MARKS[0], table, MARKS[1], after].concat())
 }
 
 /// The name of this machine's processor, where it says it.
@@ -170,10 +193,15 @@ fn programs() -> Result<Vec<Program>> {
             &lanes,
             &lanes_of("widest"),
         ),
-        program("lanes_avx2", "  with AVX2 at most", &lanes, &lanes_of("avx2")),
+        program(
+            "lanes_avx2",
+            "ours in lanes, with AVX2 at most",
+            &lanes,
+            &lanes_of("avx2"),
+        ),
         program(
             "lanes_portable",
-            "  with what every machine has",
+            "ours in lanes, with what every machine has",
             &lanes,
             &lanes_of("portable"),
         ),
@@ -185,7 +213,7 @@ fn programs() -> Result<Vec<Program>> {
         ),
         program(
             "ours_light_native",
-            "  for this processor",
+            "ours with C's kind of ECU, for this processor",
             &ours_native,
             &[["--ecu", "c"], once].concat(),
         ),
@@ -259,7 +287,14 @@ fn times_real_time(program: &Program) -> Result<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::median;
+    use super::{between, median};
+
+    #[test]
+    fn a_table_is_put_between_its_marks() {
+        let page = "A\n<!-- measured: cargo xtask bench speed --write -->\nold\n<!-- measured ends -->\nB\n";
+        assert_eq!(between(page, "new\n").unwrap(), page.replace("old", "new"));
+        assert!(between("A\n", "").is_err());
+    }
 
     #[test]
     fn a_median_is_the_middle_or_between_the_two() {
