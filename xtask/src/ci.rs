@@ -20,7 +20,7 @@ use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, SHAPE, cargo, command, root, run};
 use crate::{
     bench, bindings_agree, boards, by_hand, c_library, coverage, diagnosis, evidence, fmu, gate, logs,
-    mutants, policy, profiles, python, trace, venv, web, wheel,
+    mutants, policy, profiles, python, site, trace, venv, web, wheel,
 };
 
 /// Which stages run.
@@ -103,6 +103,8 @@ const STAGES: &[Stage] = stages! {
     "fmu-shipped" Full "the FMUs as they are handed on": || fmu::check(Built::ToShip);
     "c-shipped" Full "the C library as it is handed on": || c_library::check(Built::ToShip);
     "page-shipped" Full "the page as it is handed on": || web::check(Built::ToShip);
+    "site" Full "documents, lab and interfaces as one site, in which no link leads nowhere":
+        || site::build(&site::Options::default());
     "same-bits" Full "an evaluation in every profile: the same bytes": profiles::check;
     "instructions" Full "instructions of a step on the host, against xtask/golden.json": || bench::run(false);
     "coverage" Full "every line and branch of core": coverage::check;

@@ -141,7 +141,7 @@ enum Command {
     Claim(claims::Claim),
     /// Lines of code by crate, without tests, comments and blanks, and words in docs/, beside the budget of each (a test holds it).
     Lines,
-    /// Documents, lab and interfaces (Rust, Python) as a site of static files in target/site (needs mdbook). Exit code 1 if a
+    /// Documents, lab and interfaces (Rust, Python) as a site of static files in target/site. Exit code 1 if a
     /// link of the documents leads nowhere.
     Site(site::Options),
     /// Runs an image in QEMU and prints its log.

