@@ -44,16 +44,8 @@ pub(crate) fn build_closed_loop(processor: For) -> Result<String> {
 /// Builds a program of `bench/` and returns it.
 pub(crate) fn build(example: &str, processor: For) -> Result<String> {
     let mut cargo = tool::cargo();
-    cargo.args([
-        "build",
-        "--profile",
-        "dist",
-        "-p",
-        "haptic-guidance",
-        "--example",
-        example,
-    ]);
-    cargo.arg("--message-format=json-render-diagnostics");
+    cargo.args("build --profile dist -p haptic-guidance --example".split(' '));
+    cargo.arg(example).arg("--message-format=json-render-diagnostics");
     if let For::ThisMachine = processor {
         cargo.env("RUSTFLAGS", "-C target-cpu=native");
         cargo.args(["--target-dir", "target/native"]);

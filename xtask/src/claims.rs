@@ -48,14 +48,7 @@ impl Claim {
         // An interrupt is the program's, which says what it keeps.
         ctrlc::set_handler(|| ())?;
         let status = cargo()
-            .args([
-                "run",
-                "--release",
-                "-q",
-                "-p",
-                "haptic-evidence",
-                "--manifest-path",
-            ])
+            .args("run --release -q -p haptic-evidence --manifest-path".split(' '))
             .arg(root().join("Cargo.toml"))
             .arg("--")
             .arg(name)

@@ -53,16 +53,8 @@ pub(crate) fn published(built: Built) -> Result<()> {
     for (name, version) in PUBLISHED {
         let unpacked = place.join(format!("{}-{version}", name.replace('-', "_")));
         if !unpacked.exists() {
-            let pip = [
-                "-m",
-                "pip",
-                "download",
-                "-q",
-                "--disable-pip-version-check",
-                "--no-deps",
-            ];
             run(command(&python.to_string_lossy())
-                .args(pip)
+                .args("-m pip download -q --disable-pip-version-check --no-deps".split(' '))
                 .args(["--no-binary", name, &format!("{name}=={version}"), "-d"])
                 .arg(&place))?;
             let archive = unpacked.with_added_extension("tar.gz");

@@ -7,31 +7,11 @@ use anyhow::{Context, Result};
 use crate::tool::{command, root, run};
 
 /// What the tests of the package, its examples, and the peers of recordings, FMUs and diagnosis need.
+#[rustfmt::skip]
 pub(crate) const PACKAGES: [&str; 25] = [
-    "asammdf",
-    "can-isotp",
-    "canmatrix",
-    "cantools",
-    "commonroad-vehicle-models",
-    "cryptography",
-    "distributed",
-    "fmpy",
-    "gymnasium>=1.1",
-    "ipykernel",
-    "matplotlib",
-    "mcap",
-    "mypy",
-    "nbclient",
-    "numpy",
-    "odxtools",
-    "pandas",
-    "pdoc",
-    "pyarrow",
-    "pyserial",
-    "pytest",
-    "python-can",
-    "scipy",
-    "tqdm",
+    "asammdf", "can-isotp", "canmatrix", "cantools", "commonroad-vehicle-models", "cryptography",
+    "distributed", "fmpy", "gymnasium>=1.1", "ipykernel", "matplotlib", "mcap", "mypy", "nbclient", "numpy",
+    "odxtools", "pandas", "pdoc", "pyarrow", "pyserial", "pytest", "python-can", "scipy", "tqdm",
     "udsoncan",
 ];
 
@@ -59,7 +39,7 @@ pub(crate) fn environment_of(place: &Path, packages: &[&str]) -> Result<PathBuf>
         return Ok(python);
     }
     run(command(&python.to_string_lossy())
-        .args(["-m", "pip", "install", "-q", "--disable-pip-version-check"])
+        .args("-m pip install -q --disable-pip-version-check".split(' '))
         .args(packages))?;
     std::fs::write(&installed, list)?;
     Ok(python)

@@ -47,15 +47,8 @@ fn build(built: Built) -> Result<PathBuf> {
         Built::ToShip => "page",
     };
     let mut build = cargo();
-    build.args([
-        "build",
-        "--profile",
-        profile,
-        "-p",
-        "haptic-web",
-        "--target",
-        TARGET,
-    ]);
+    build.args("build -p haptic-web --target".split(' '));
+    build.args([TARGET, "--profile", profile]);
     if built == Built::ToShip {
         build.env("RUSTFLAGS", dist::remapped()?.join(" "));
     }
