@@ -186,7 +186,7 @@ impl ReadingArguments {
     pub(super) fn read(&self, path: &Path) -> Result<Contents, BadInput> {
         if let Some(layout) = self.layout()? {
             let bytes = std::fs::read(path).map_err(in_file(path))?;
-            let table = layout.recording(&bytes, Format::from_path(path).ok(), &self.maps()?);
+            let table = layout.recording(&bytes, Format::if_named(path)?, &self.maps()?);
             let table = table.map_err(in_file(path))?;
             return Ok(Contents::Channels(table.within(&self.stretches()?)?));
         }

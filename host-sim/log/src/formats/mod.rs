@@ -102,21 +102,11 @@ impl Format {
     /// # Errors
     /// No extension that is known, with those that are.
     pub fn from_path(path: &Path) -> Result<Self, RecordingError> {
-        let extension = path.extension().unwrap_or_default().to_string_lossy();
-        let extension = extension.to_lowercase();
-        let found = EXTENSIONS.iter().find(|(known, _)| *known == extension);
-        found.map(|(_, format)| *format).ok_or_else(|| {
-            if ELSEWHERE.contains(&extension.as_str()) {
-                return RecordingError(format!(
-                    "{}: this build knows no .{extension}, {LARGER}",
-                    path.display()
-                ));
-            }
+        Self::if_named(path)?.ok_or_else(|| {
             let known: Vec<String> = EXTENSIONS.iter().map(|(known, _)| format!(".{known}")).collect();
-            let what = if extension.is_empty() {
-                "no extension".into()
-            } else {
-                format!("the extension .{extension}")
+            let what = match path.extension() {
+                None => "no extension".into(),
+                Some(extension) => format!("the extension .{}", extension.display()),
             };
             RecordingError(format!(
                 "{}: {what} says which format it is; one of {} is wanted",
@@ -124,6 +114,23 @@ impl Format {
                 known.join(", ")
             ))
         })
+    }
+
+    /// The format of a file's name, if its extension is known.
+    ///
+    /// # Errors
+    /// An extension that only a larger build knows.
+    pub fn if_named(path: &Path) -> Result<Option<Self>, RecordingError> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let extension = extension.to_lowercase();
+        if ELSEWHERE.contains(&extension.as_str()) {
+            return Err(RecordingError(format!(
+                "{}: this build knows no .{extension}, {LARGER}",
+                path.display()
+            )));
+        }
+        let found = EXTENSIONS.iter().find(|(known, _)| *known == extension);
+        Ok(found.map(|(_, format)| *format))
     }
 
     /// Whether it holds frames of a bus.

@@ -49,7 +49,7 @@ pub fn open(
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     let named = |e: LogError| LogError::in_file(path.display(), e);
-    let format = Format::from_path(path).ok();
+    let format = Format::if_named(path)?;
     let mut head = Vec::new();
     let opened = std::fs::File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
     opened.map_err(|e| LogError::in_file(path.display(), e))?;
