@@ -13,7 +13,7 @@ use crate::{dist, venv};
 /// What `cargo xtask wheel` is asked for.
 #[derive(Debug, Args)]
 pub(crate) struct Options {
-    /// Build what is handed on: optimised, and for every Linux since glibc 2.17
+    /// Build what is handed on: optimised, with Parquet, and for every Linux since glibc 2.17
     #[arg(long)]
     dist: bool,
     /// Install the wheel into a fresh virtual environment and run its tests, its README and its examples there.
@@ -58,7 +58,11 @@ pub(crate) const PACKAGES: [&str; 2] = ["haptic-python", "host-sim"];
 
 /// Builds the wheel, and tries it if asked to.
 pub(crate) fn build(options: &Options) -> Result<()> {
-    let wheel = make(options.dist)?;
+    let wheel = make(match (options.dist, options.test || options.bench) {
+        (true, _) => Built::ToShip,
+        (false, true) => Built::ForTests,
+        (false, false) => Built::Daily,
+    })?;
     let megabytes = std::fs::metadata(&wheel)?.len() as f64 / 1e6;
     println!("{}: {megabytes:.2} MB", wheel.display());
     if megabytes > LARGEST_MB {
@@ -79,11 +83,11 @@ pub(crate) fn build(options: &Options) -> Result<()> {
 
 /// The interpreter of an environment that has the wheel, built anew.
 pub(crate) fn installed() -> Result<PathBuf> {
-    install(&make(true)?)
+    install(&make(Built::ToShip)?)
 }
 
-/// Builds the wheel with the command line in it: `to_ship`, or in the profile of the tests, which compiles the fastest.
-pub(crate) fn make(to_ship: bool) -> Result<PathBuf> {
+/// Builds the wheel with the command line in it. The daily one is without Parquet, so that nothing is compiled that the first command has.
+pub(crate) fn make(built: Built) -> Result<PathBuf> {
     let dist = root().join("target/dist");
     let wheels = || {
         let files = std::fs::read_dir(&dist).into_iter().flatten().flatten();
@@ -95,14 +99,14 @@ pub(crate) fn make(to_ship: bool) -> Result<PathBuf> {
     for old in wheels() {
         std::fs::remove_file(&old).with_context(|| old.display().to_string())?;
     }
-    let built = pack(&dist, to_ship);
+    let packed = pack(&dist, built);
     // What stays would be in a wheel of maturin alone, however old it is.
     let _ = std::fs::remove_dir_all(root().join(DATA));
-    built?;
+    packed?;
     wheels().next().context("maturin left no wheel")
 }
 
-fn pack(dist: &Path, to_ship: bool) -> Result<()> {
+fn pack(dist: &Path, built: Built) -> Result<()> {
     let scripts = root().join(DATA).join("scripts");
     std::fs::create_dir_all(&scripts).with_context(|| scripts.display().to_string())?;
     let program = scripts.join(HOST_SIM);
@@ -110,7 +114,7 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
     maturin
         .args("build -m bindings/python/Cargo.toml --out".split(' '))
         .arg(dist);
-    if to_ship {
+    if built == Built::ToShip {
         let built = dist::build("host-sim", ALL_FORMATS)?.join(HOST_SIM);
         std::fs::copy(built, &program)?;
         let host = dist::host()?;
@@ -127,6 +131,9 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
     } else {
         std::fs::copy(dist::stripped(&Built::Daily.host_sim()?)?, &program)?;
         maturin.args(["--profile", "release"]);
+        if built == Built::Daily {
+            maturin.arg("--no-default-features");
+        }
         if cfg!(target_os = "linux") {
             // No promise to other computers.
             maturin.args(["--compatibility", "linux"]);
@@ -137,16 +144,7 @@ fn pack(dist: &Path, to_ship: bool) -> Result<()> {
 
 /// What is linked.
 pub(crate) fn look_at_crates() -> Result<()> {
-    let tree = [
-        "tree",
-        "-p",
-        "haptic-python",
-        "-e",
-        "normal",
-        "--prefix",
-        "none",
-        "-f",
-    ];
+    let tree = "tree -p haptic-python -e normal --prefix none -f".split(' ');
     let linked = output(cargo().args(tree).arg("{p} {f}"))?;
     let names: std::collections::BTreeSet<&str> =
         linked.lines().filter_map(|line| line.split(' ').next()).collect();
@@ -171,4 +169,43 @@ fn install(wheel: &Path) -> Result<PathBuf> {
     let fresh = ["-m", "pip", "install", "-q", "--force-reinstall", "--no-deps"];
     run(command(&python.to_string_lossy()).args(fresh).arg(wheel))?;
     Ok(python)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use super::*;
+
+    /// Each package that is compiled, with its features: one name may stand for several versions.
+    fn features(of: &str) -> BTreeMap<String, BTreeSet<String>> {
+        let tree = format!("tree --offline --no-dedupe -e normal,build --prefix none {of} -f");
+        let tree = output(cargo().args(tree.split(' ')).arg("{p}: {f}")).unwrap();
+        let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        for line in tree.lines() {
+            let (package, features) = line.split_once(": ").unwrap_or((line.trim_end_matches(':'), ""));
+            let package = package.trim_end_matches(" (proc-macro)").to_owned();
+            all.entry(package).or_default().insert(features.to_owned());
+        }
+        all
+    }
+
+    /// With other features a package and all that use it would be compiled once more.
+    #[test]
+    fn what_the_first_command_has_compiled_is_not_compiled_for_xtask_and_wheel() {
+        let first = features("-p host-sim");
+        for later in ["-p xtask", "-p haptic-python --no-default-features"] {
+            let mut shared = 0;
+            for (package, features) in features(later) {
+                if let Some(there) = first.get(&package) {
+                    assert!(
+                        features.is_subset(there),
+                        "{later}: {package}: {features:?}, not {there:?}"
+                    );
+                    shared += 1;
+                }
+            }
+            assert!(shared > 30, "{later}: {shared} packages");
+        }
+    }
 }

@@ -40,6 +40,11 @@ def files(result):
     return [(result.directory / name).read_bytes() for name in names]
 
 
+def test_a_package_without_parquet_says_so(tmp_path):
+    with pytest.raises(FileNotFoundError, match="built without Parquet.*drives.csv"):
+        hg.SweepResult(tmp_path, {}).parquet
+
+
 def test_rows_are_the_runs_of_their_scenarios(spec, tmp_path):
     result = hg.sweep(spec, out=tmp_path / "threads")
     rows = list(csv.DictReader(result.csv.open()))

@@ -53,21 +53,15 @@ pub(super) fn archive(release: &Release) -> Result<()> {
     }
     evaluate(&place.join(&name).join(HOST_SIM), &place)?;
     let evidence = place.join(&name).join(EVIDENCE);
-    let reliance = [
-        "reliance",
-        "--participants",
-        "1",
-        "--seeds",
-        "1",
-        "--out",
-        "reliance",
-    ];
+    let reliance: Vec<&str> = "reliance --participants 1 --seeds 1 --out reliance"
+        .split(' ')
+        .collect();
     alone(&evidence, &place, &reliance, &["reliance/results.json"])
 }
 
 /// The wheel, installed by itself into an empty environment: what it depends on is PyPI's.
 pub(super) fn wheel(release: &Release) -> Result<()> {
-    let wheel = wheel::make(release.built == Built::ToShip)?;
+    let wheel = wheel::make(release.built)?;
     wheel::look_at_crates()?;
     copy_into(&wheel, &release.place)?;
     let place = release.try_in(Part::Wheel)?;

@@ -33,8 +33,19 @@ class SweepResult:
 
     @property
     def parquet(self) -> Path:
-        """The table, a row a drive: ``pandas.read_parquet(result.parquet)``."""
-        return self.directory / "drives.parquet"
+        """The table, a row a drive: ``pandas.read_parquet(result.parquet)``.
+
+        Raises
+        ------
+        FileNotFoundError
+            The package was built without Parquet.
+        """
+        table = self.directory / "drives.parquet"
+        if not table.exists():
+            raise FileNotFoundError(
+                f"{table}: this package was built without Parquet, which `cargo xtask wheel --dist` has; {self.csv} has the same rows"
+            )
+        return table
 
     @property
     def csv(self) -> Path:
