@@ -1,6 +1,7 @@
 """The FMUs, checked by FMPy, those of FMI 2.0 and of FMI 3.0: their descriptions are valid; the controller gives the torques
 of the library for the same samples, bit for bit; a state can be taken, written, read by another unit and given back; what is
-refused leaves everything as it was; controller, driver and vehicle coupled drive as `host-sim run` does, on any road.
+refused leaves everything as it was; controller, driver and vehicle coupled drive as `host-sim run` does, on any road and through a
+torsion bar.
 
     check.py DIRECTORY RUN_CSV
 """
@@ -371,6 +372,48 @@ def coupled(directory, ending, until_s, **road):
     return np.array(errors)
 
 
+def through_a_bar(directory, ending):
+    """The three with a torsion bar drive as the library, to the bit: the driver's torque is of the step before, the guidance's of this one.
+    Files without a bar, and of no column, are refused."""
+    path = lambda model: directory / f"{model}.{ending}"
+    example = Path("examples/torsion-bar.toml").resolve()
+    scenario = hg.Scenario.load(example)
+    told = {name: float(value) for name, value in scenario.to_dict()["guidance"].items() if name in BAR}
+    assert set(told) == set(BAR) and told["torque_sensor"] == 1
+    vehicle = Unit(path("HapticVehicle"), column=str(example))
+    driver = Unit(path("HapticDriver"), t_p_s=scenario.t_p_s, k_d_nm_per_rad=scenario.k_d, k_hg=scenario.k_hg)
+    guidance = Unit(path("HapticController"), engaged_at_start=True, **told)
+    guidance.turn(engage=True)
+    run = hg.simulate(scenario)
+    names = ("lateral_error_m", "driver_torque_nm", "guidance_torque_nm", "wheel_angle_rad")
+    differing, apart = 0, 0.0
+    for k in range(105_000):
+        seen = vehicle.get(
+            "e_y_m", "e_theta_rad", "guidance_e_y_m", "guidance_e_theta_rad", "wheel_angle_rad", "felt_torque_nm", "told_angle_rad",
+            "column_torque_nm", "motor_torque_nm", "speed_m_per_s", "lateral_error_m",
+        )
+        e_y, e_theta, near, far, wheel, felt, angle, column, motor, speed, lateral = seen
+        guidance.put(
+            e_y_m=near, e_theta_rad=far, driver_torque_nm=column, wheel_angle_rad=angle, motor_torque_nm=motor, speed_m_per_s=speed,
+        )
+        guidance.step(k)
+        hands, torque = driver.get("driver_torque_nm")[0], guidance.get("torque_nm")[0]
+        driver.put(e_y_m=e_y, e_theta_rad=e_theta, wheel_angle_rad=wheel, guidance_torque_nm=felt)
+        vehicle.put(driver_torque_nm=hands, guidance_torque_nm=torque)
+        driver.step(k)
+        vehicle.step(k)
+        if k % 5 == 0:
+            differing += (lateral, hands, torque, wheel) != tuple(run[name][k // 5] for name in names)
+            apart = max(apart, abs(angle - wheel))
+    assert differing == 0 and apart > 1e-3, (differing, apart)
+    for unit in (vehicle, driver, guidance):
+        unit.end()
+    for wrong, said in (("examples/relying-driver.toml", "torsion-bar"), ("core/haptic.dbc", "TOML"), ("no-such.toml", "No such file")):
+        why = refused(lambda: Unit(path("HapticVehicle"), column=str(Path(wrong).resolve())))
+        assert "column = " in why and Path(wrong).name in why and said in why, why
+    return apart
+
+
 def main(directory, run_csv):
     tokens = {read_model_description(directory / f"{model}.fmu").guid for model in MODELS}
     assert len(tokens) == len(MODELS), "a token tells which model of the binary it is"
@@ -388,6 +431,8 @@ def main(directory, run_csv):
         print(f"{ending}: {sum(bounds(path) for path in paths)} inputs have ranges; 2.5 s of states are {', '.join(map(str, sizes))} "
               "bytes, and other units go on from them with the same bits")
         print(f"{ending}: roads of one's own: {roads(directory, ending) * 1e3:.3f} mm from the library's drive on hill-road.toml")
+        print(f"{ending}: through examples/torsion-bar.toml: 105 s to the bit as the library; wheel and column up to "
+              f"{through_a_bar(directory, ending) * 1e3:.1f} mrad apart")
         print(f"{ending}: fmpy validate: no problem in {', '.join(MODELS)}; controller: {STEPS} torques, {differing} differ "
               "from the library's; state and refusals hold")
     with open(run_csv) as file:
@@ -406,6 +451,8 @@ def main(directory, run_csv):
 
 # Those of the scenario of `cargo xtask fmu`.
 DRIVER = dict(t_p_s=0.3, k_d_nm_per_rad=3.0, k_hg=0.5)
+# What the ECU is told of a bar.
+BAR = ("torque_sensor", "wheel_inertia_kg_m2", "wheel_friction_nm", "bar_stiffness_nm_per_rad")
 
 if __name__ == "__main__":
     main(Path(sys.argv[1]), sys.argv[2])

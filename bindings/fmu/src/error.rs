@@ -23,9 +23,9 @@ pub enum FmuError {
     /// Parameters of the vehicle that cannot be.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// A road that cannot be.
-    #[error("course = {0}")]
-    Course(InputError),
+    /// A road or a column that cannot be.
+    #[error("{0} = {1}")]
+    Text(&'static str, InputError),
     /// A value that is not finite: name and value.
     #[error("{0} = {1} is no finite number")]
     NotFinite(&'static str, f64),
