@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use haptic_column::linear::{Hands, Linear};
+use haptic_sim::models::nonlinear::{Tyres, WorldParameters};
 use haptic_sim::models::torsion_bar::{Assist, BarPlant, ColumnKind, ColumnParameters, Curve, Inject};
 use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::parts::{Acting, PaperVehicle, Vehicle};
@@ -96,27 +97,87 @@ fn exact_steps_and_those_of_runge_kutta_agree() {
     }
 }
 
+/// The paper's column with a stiff bar, on saturating tyres, in gusts, on banks to either side, while the car brakes from 25 to 10 m/s.
+#[test]
+fn a_stiff_bar_in_wind_on_a_bank_and_braking_is_the_paper_s_column() {
+    for side in [1.0, -1.0] {
+        let world = WorldParameters {
+            tyres: Tyres::Saturating,
+            mu: 0.8,
+            bank_rad: side * 0.05,
+            wind_n: -side * 300.0,
+            gust_sd_n: 200.0,
+            ..WorldParameters::default()
+        };
+        let text = "[column]\nkind = \"torsion-bar\"\nk_tb_nm_per_rad = 1e6\nupper_friction_nm = 0\nlower_friction_nm = 0\n\
+                    sensor_noise_nm = 0\n[assist]\nmotor_lag_s = 0.0002\n";
+        let scenario = |text| Scenario::from_toml("s", text, |_, _| unreachable!()).unwrap();
+        let within = |of: Scenario| of.to_builder().world(world).seed(7).build().unwrap();
+        let (mut bar, mut paper) = (
+            BarPlant::new(&within(scenario(text))),
+            PaperVehicle::new(&within(scenario(""))),
+        );
+        let (mut apart, mut aside, mut turned) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for k in 0..10_000 {
+            let [hands, guidance] = torques(k);
+            let speed = |k: u32| 25.0 - 1.5e-3 * f64::from(k);
+            let acting = Acting {
+                speed_m_per_s: [speed(k), speed(k + 1)],
+                bank_rad: side * 0.02,
+                ..acting(hands, guidance)
+            };
+            bar.step(&acting);
+            paper.step(&acting);
+            let [a, b] = [bar.motion(), paper.motion()];
+            apart = apart.max((a.wheel_angle_rad - b.wheel_angle_rad).abs());
+            aside = aside.max((a.position_m[1] - b.position_m[1]).abs());
+            turned = turned.max(b.wheel_angle_rad.abs());
+        }
+        assert!(
+            apart < 2e-4 && aside < 2e-3 && turned > 0.1,
+            "{apart} {aside} {turned}"
+        );
+    }
+}
+
 /// Work of hands, motor and tyres is what moves, what is in the bar, and what damping and friction took, here summed by the
-/// trapezoidal rule. Friction after Dahl keeps F z^2 / (2 give) and takes the rest.
+/// trapezoidal rule. Friction after Dahl keeps F z^2 / (2 give) and takes the rest. The body has its own balance.
 #[test]
 fn no_energy_is_lost_or_found() {
+    energy(0.0, 0.0, 0.0);
+    // Braking by 1.2 m/s2 on a bank, in wind.
+    energy(-1.2e-3, 0.06, 300.0);
+    energy(-1.2e-3, -0.06, -300.0);
+}
+
+fn energy(gains_m_per_s: f64, bank_rad: f64, wind_n: f64) {
     let vehicle = VehicleParameters::default();
     let bar = ColumnParameters {
+        kind: ColumnKind::TorsionBar,
         b_tb_nms_per_rad: 0.1,
         sensor_noise_nm: 0.0,
         ..ColumnParameters::default()
     };
-    let mut plant = plant(bar, Assist::Points(Curve::usual(1.0)));
+    let world = WorldParameters {
+        wind_n,
+        wind_lever_m: 0.3,
+        ..WorldParameters::default()
+    };
+    let scenario = Scenario::builder().column(bar).world(world).build().unwrap();
+    let mut plant = BarPlant::new(&scenario).with_assist(Assist::Points(Curve::usual(1.0)));
     let (j_c, b_c) = (vehicle.j_s - bar.j_w_kg_m2, vehicle.b_s - bar.b_w_nms_per_rad);
     let stored = |x: &[f64; 13]| {
         let friction = |nm: f64, z: f64| nm * z * z / (2.0 * bar.friction_give_rad);
-        0.5 * (bar.j_w_kg_m2 * x[3] * x[3] + j_c * x[6] * x[6] + bar.k_tb_nm_per_rad * (x[2] - x[5]).powi(2))
+        let column = 0.5
+            * (bar.j_w_kg_m2 * x[3] * x[3] + j_c * x[6] * x[6] + bar.k_tb_nm_per_rad * (x[2] - x[5]).powi(2))
             + friction(bar.upper_friction_nm, x[4])
-            + friction(bar.lower_friction_nm, x[7])
+            + friction(bar.lower_friction_nm, x[7]);
+        [column, 0.5 * (vehicle.m * x[0] * x[0] + vehicle.i * x[1] * x[1])]
     };
     let k_aln = vehicle.aligning_stiffness();
-    let power = |x: &[f64; 13], hands_nm: f64| {
-        let aligning = -k_aln * (vehicle.k_t * x[5] - (x[0] + vehicle.l_f * x[1]) / V);
+    let power = |x: &[f64; 13], hands_nm: f64, v: f64| {
+        let front_slip = vehicle.k_t * x[5] - (x[0] + vehicle.l_f * x[1]) / v;
+        let aligning = -k_aln * front_slip;
         // |w| z^2 / give^2 is what Dahl's friction turns into heat.
         let slides = |nm: f64, w: f64, z: f64| nm * w.abs() * (z / bar.friction_give_rad).powi(2);
         let heat = bar.b_w_nms_per_rad * x[3] * x[3]
@@ -124,21 +185,40 @@ fn no_energy_is_lost_or_found() {
             + bar.b_tb_nms_per_rad * (x[3] - x[6]).powi(2)
             + slides(bar.upper_friction_nm, x[3], x[4])
             + slides(bar.lower_friction_nm, x[6], x[7]);
-        hands_nm * x[3] + (x[10] + aligning) * x[6] - heat
+        let front = 2.0 * vehicle.k_f * front_slip;
+        let rear = -2.0 * vehicle.k_r * (x[0] - vehicle.l_r * x[1]) / v;
+        let side = front + rear + wind_n - vehicle.m * (9.81 * bank_rad.sin() + v * x[1]);
+        let turning = vehicle.l_f * front - vehicle.l_r * rear + 0.3 * wind_n;
+        [
+            hands_nm * x[3] + (x[10] + aligning) * x[6] - heat,
+            side * x[0] + turning * x[1],
+        ]
     };
-    let (mut given, mut moved) = (0.0, 0.0_f64);
+    let (mut given, mut moved) = ([0.0; 2], [0.0_f64; 2]);
     for k in 0..8000 {
         let [hands, guidance] = torques(k);
-        let before = power(plant.state(), hands);
-        plant.step(&acting(hands, guidance));
-        given += 0.5e-3 * (before + power(plant.state(), hands));
-        moved = moved.max(stored(plant.state()));
+        let [from, to] = [k, k + 1].map(|k| V + gains_m_per_s * f64::from(k));
+        let before = power(plant.state(), hands, from);
+        plant.step(&Acting {
+            speed_m_per_s: [from, to],
+            bank_rad,
+            ..acting(hands, guidance)
+        });
+        let after = power(plant.state(), hands, to);
+        for of in 0..2 {
+            given[of] += 0.5e-3 * (before[of] + after[of]);
+            moved[of] = moved[of].max(stored(plant.state())[of]);
+        }
     }
-    let balance = given - stored(plant.state());
-    assert!(
-        moved > 0.01 && balance.abs() < 0.01 * moved,
-        "{balance} of {moved} J"
-    );
+    let left = stored(plant.state());
+    for of in 0..2 {
+        let balance = given[of] - left[of];
+        assert!(
+            moved[of] > 0.01 && balance.abs() < 0.01 * moved[of],
+            "{balance} of {} J, bank {bank_rad}",
+            moved[of]
+        );
+    }
 }
 
 /// By hand: sqrt(143.24/0.044)/2 pi = 9.08 Hz with the column held (heavy); with it free sqrt(143.24 (1/0.044 + 1/0.066))/2 pi =
