@@ -27,6 +27,9 @@ const ACTIVITY: Params = Params {
 /// What 0.1 N.m each make beside 10 mrad/s, to the nearest power of two.
 const NOBODY: f64 = 1.0 / 1_048_576.0;
 
+/// No hand turns a wheel faster than 8 rad/s: more counts as that.
+const FASTEST: f64 = 8.0;
+
 fn coefficients(rate_corner_hz: f64) -> Coefficients {
     let params = Params {
         rate_corner_hz,
@@ -62,7 +65,7 @@ impl Expected {
             _ => 0.0,
         };
         self.last = Some((at_s, wheel));
-        let both = torques * self.rate * self.rate;
+        let both = torques * self.rate.abs().min(FASTEST).powi(2);
         self.size += passed_s / 1.0 * (both.abs() - self.size);
         let agreement = self.agreement + passed_s / 0.5 * (both - self.agreement);
         self.agreement = agreement.clamp(-self.size, self.size);
@@ -131,6 +134,36 @@ fn who_helps_has_all_and_who_works_against_it_the_least_share() {
             assert!((share - expected).abs() < 1e-3, "{driver}: {share}");
             // Whatever it was computed with, what is read bounds it.
             assert!(activity.share(Ratio::from_si(0.6)).si() >= 0.6 - 1e-6);
+        }
+    }
+}
+
+/// Help at 4 rad/s, and then work against it at more than a hand's 8 rad/s, which counts as 8: how much of the help that outweighs
+/// depends on where the rate is cut.
+#[test]
+fn a_rate_that_no_hand_has_counts_as_the_fastest_hand() {
+    for (turns, helps) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+        for fast in [9.5, 20.0] {
+            let (mut activity, mut expected) = (Activity::NEW, Expected::default());
+            let mut wheel = 0.0;
+            for ms in (0..1200_u32).step_by(2) {
+                let is_fast = ms >= 1000;
+                wheel += turns * 2e-3 * if is_fast { fast } else { 4.0 };
+                let torques = [if is_fast { -helps } else { helps }, helps];
+                let at = sample(1000 * ms, Radians::from_rad(wheel), torques);
+                activity.feel(&coefficients(10.0), &at);
+                let share = activity.share(Ratio::from_si(0.05)).si();
+                let product = torques[0] * torques[1];
+                let in_f64 = expected.share(1e-3 * f64::from(ms), wheel, product, 0.05, 10.0);
+                assert!(
+                    (share - in_f64).abs() < 2e-3,
+                    "{fast} rad/s, {ms} ms: {share}, not {in_f64}"
+                );
+            }
+            // By the equations of the low-passes: A is 10.1*e^(-2t) - 64*(1 - e^(-2t)) and B 10.1*e^(-t) + 64*(1 - e^(-t)) after
+            // t = 0.2 s, less the time constant of 16 ms in which the rate settles.
+            let share = activity.share(Ratio::from_si(0.05)).si();
+            assert!((0.30..0.42).contains(&share), "{fast} rad/s: {share}");
         }
     }
 }

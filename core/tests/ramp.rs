@@ -94,7 +94,7 @@ fn the_lesser_of_two_torques() {
 /// Outputs of 1, 2, 3 .. mN.m, one per millisecond from just before the clock wraps; the last is `ms` mN.m.
 fn rising(ms: u32) -> (TorqueHistory, Instant) {
     let start = Instant::from_us(u32::MAX - 20_000);
-    let mut history = TorqueHistory::default();
+    let mut history = TorqueHistory::NEW;
     for k in 1..=ms {
         let now = start.after(Micros::from_ms(k));
         history.push(now, nm(f64::from(k) * 1e-3));
@@ -132,7 +132,7 @@ fn trusted_is_the_last_output_kept_before_the_suspect_time() {
 #[test]
 fn a_history_shorter_than_the_suspect_time_trusts_no_torque() {
     assert_eq!(
-        TorqueHistory::new().trusted(Instant::from_us(77), Micros::from_ms(1)),
+        TorqueHistory::NEW.trusted(Instant::from_us(77), Micros::from_ms(1)),
         Torque::ZERO
     );
     let (history, last) = rising(100);

@@ -215,7 +215,7 @@ pub(super) struct KeptOnce {
 impl KeptOnce {
     pub(super) fn new() -> Self {
         Self {
-            torque_history: TorqueHistory::new(),
+            torque_history: TorqueHistory::NEW,
             motion_history: MotionHistory::new(),
             is_lane_pending: false,
             is_column_pending: false,

@@ -288,6 +288,7 @@ impl Coefficients {
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two
     /// `i32` times 10^6 times 2^4 gives 2^57 too: the sum cannot overflow.
+    #[inline(always)]
     fn filter(&self, rate: I12F20, from: I8F24, to: I8F24, dt: Micros) -> I12F20 {
         const MOST: u32 = MAX_RATE << I12F20::FRAC_NBITS;
         let tau = i64::from(self.tau);

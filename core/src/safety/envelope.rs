@@ -148,6 +148,7 @@ impl Envelope {
 
     /// The nearest torque within the envelope, and which limit held it back.
     #[must_use]
+    #[inline(always)]
     pub fn step(
         &self,
         state: &mut EnvelopeState,

@@ -26,7 +26,7 @@ const BEFORE: Micros = Micros::from_ms(50);
 const BEFORE_PER_S: i32 = 20;
 
 /// The vehicle's heading at an instant, and its yaw rate from then on.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Heading {
     at: Instant,
     /// Heading relative to that at the start of the ECU, modulo 256 rad.
@@ -36,12 +36,6 @@ pub struct Heading {
 }
 
 impl Heading {
-    const NONE: Self = Self {
-        at: Instant::from_us(0),
-        psi: I8F24::ZERO,
-        rate: TurningRate::ZERO,
-    };
-
     /// The heading at an earlier instant, if the yaw rate was the same before; for half a second at most.
     #[cold]
     fn earlier(&self, at: Instant) -> Self {
@@ -61,7 +55,7 @@ impl Heading {
 }
 
 /// Directions of a line at the far point, relative to the same direction as the headings.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Line {
     directions: [(Instant, I8F24); RING],
     last: usize,
@@ -70,12 +64,6 @@ struct Line {
 }
 
 impl Line {
-    const NEW: Self = Self {
-        directions: [(Instant::from_us(0), I8F24::ZERO); RING],
-        last: 0,
-        known: 0,
-    };
-
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     fn place(&self, back: usize) -> (Instant, I8F24) {
         self.directions[self.last.wrapping_sub(back) % RING]
@@ -83,7 +71,7 @@ impl Line {
 }
 
 /// The rings of headings and of directions: of the line that is followed, and of another one that pictures show.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct MotionHistory {
     headings: [Heading; RING],
     newest: usize,
@@ -95,13 +83,8 @@ pub struct MotionHistory {
 impl MotionHistory {
     /// Nothing is known yet.
     #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            headings: [Heading::NONE; RING],
-            newest: 0,
-            lines: [Line::NEW; 2],
-            followed: 0,
-        }
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// Stores the yaw rate from now on.
@@ -213,11 +196,5 @@ impl MotionHistory {
     #[expect(clippy::indexing_slicing, reason = "a place is modulo two")]
     pub fn forget_line(&mut self) {
         self.lines[self.followed % 2].known = 0;
-    }
-}
-
-impl Default for MotionHistory {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -171,13 +171,10 @@ impl Outputs {
 
 impl TorqueHistory {
     /// Nothing applied yet.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            fine: Outputs::NONE,
-            coarse: Outputs::NONE,
-        }
-    }
+    pub const NEW: Self = Self {
+        fine: Outputs::NONE,
+        coarse: Outputs::NONE,
+    };
 
     /// Remembers an output. The coarse ring is asked only where the fine one took it.
     pub fn push(&mut self, now: Instant, torque: Torque) {
@@ -214,11 +211,5 @@ pub fn smaller_of_same_sign(a: Torque, b: Torque) -> Torque {
         a
     } else {
         b
-    }
-}
-
-impl Default for TorqueHistory {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -168,6 +168,7 @@ impl<T: Words> Redundant<T> {
 
     /// The value, if both copies still agree.
     #[must_use]
+    #[inline(always)]
     pub fn get(&self) -> Option<&T> {
         // Without the black box the compiler may prove, across the loop that owns this value, that the
         // copies always agree, and drop the comparison. Around the reference, it costs no copy.

@@ -103,9 +103,9 @@ impl Guidance {
     /// rounding crosses no upper bound; the envelope's bound on the reduction leaves room for it.
     #[must_use]
     pub fn rounded(torque: Torque) -> Torque {
-        const LSB: i64 = 1 << (24 - Guidance::TORQUE_LSB);
-        let raw = (i64::from(torque.bits()) / LSB).clamp(-Self::TORQUE_MAX, Self::TORQUE_MAX);
-        Torque::from_wide(from_lsb(raw, Self::TORQUE_LSB))
+        const LSB: i32 = 1 << (24 - Guidance::TORQUE_LSB);
+        let cut = Torque::from_bits(torque.bits() % LSB);
+        torque.minus(cut).within(Torque::from_nm(5.0))
     }
 }
 

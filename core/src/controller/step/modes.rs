@@ -127,7 +127,6 @@ impl<I: Injection> Step<'_, I> {
         faults
             .unseen()
             .max(lost_for(Fault::LaneTimeout, times.lane))
-            .max(lost_for(Fault::LaneInvalid, times.lane))
             .max(lost_for(Fault::LaneStep, times.lane))
             .max(lost_for(Fault::SpeedStep, times.motion))
             .max(lost_for(Fault::ColumnTimeout, times.column))

@@ -90,6 +90,7 @@ impl<I: Injection> Step<'_, I> {
     /// The torque of (9) times four shares: the authority that the host asks for, that of the schedule at this speed, the trust in
     /// the lane, and what the law leaves. Without a request the authority is 1: the mode ends guidance then. Without a lane the
     /// torque is zero.
+    #[inline(always)]
     fn guidance(&mut self) -> Torque {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !self.memory.law.is_latest(&sample) {
