@@ -181,7 +181,7 @@ mod tests {
             (ColumnKind::TorsionBar, 0.0, 0.044, true),
             (ColumnKind::TorsionBar, 0.2, 0.033, true),
             (ColumnKind::TorsionBar, 0.2, 0.064, true),
-            (ColumnKind::Rigid, 0.0, 0.033, false),
+            (ColumnKind::Rigid, 0.0, 0.044, false),
         ] {
             let column = ColumnParameters {
                 kind,
