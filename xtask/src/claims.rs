@@ -15,6 +15,8 @@ pub(crate) enum Claim {
     Faults(Passed),
     /// How often guidance leaves for nothing on real roads, by cause (`cargo xtask availability --help`).
     Availability(Passed),
+    /// How often an EPS with limits of its own would fault behind our ECU (`cargo xtask eps --help`).
+    Eps(Passed),
     /// What a lost input costs, with a handover and without (`cargo xtask handover --help`).
     Handover(Passed),
     /// How well the ECU estimates K_hg while it drives (`cargo xtask reliance --help`).
@@ -40,6 +42,7 @@ impl Claim {
         let (name, passed) = match self {
             Self::Faults(passed) => ("faults", passed),
             Self::Availability(passed) => ("availability", passed),
+            Self::Eps(passed) => ("eps", passed),
             Self::Handover(passed) => ("handover", passed),
             Self::Reliance(passed) => ("reliance", passed),
             Self::Validate(passed) => ("validate", passed),

@@ -26,7 +26,7 @@ pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("host-sim/batch", 10_100),
     ("host-sim/campaign", 4_150),
     ("host-sim/column", 1_630),
-    ("host-sim/evidence", 7_470),
+    ("host-sim/evidence", 7_620),
     ("host-sim/log", 5_810),
     ("host-sim/metrics", 550),
     ("host-sim/pil", 2_360),

@@ -1,6 +1,7 @@
 //! What the claims about controller and identification rest on, as far as no other crate needs it. The program is `src/main.rs`.
 //!
 //! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
+//! - [`eps`]: how often an EPS with limits of its own would fault.
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //! - [`estimates`]: the identification, on drivers whose truth is known; [`vehicle`]: that of a vehicle.
@@ -8,6 +9,7 @@
 
 pub mod availability;
 mod declared;
+pub mod eps;
 pub mod estimates;
 pub mod handover;
 pub mod real_drives;

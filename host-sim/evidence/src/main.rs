@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use host_sim::cli::{FileArguments, signed, status};
 
-use cli::{availability, faults, handover, real_drives, reliance, validate};
+use cli::{availability, eps, faults, handover, real_drives, reliance, validate};
 
 /// What the claims about controller and identification rest on
 #[derive(Debug, Parser)]
@@ -35,6 +35,8 @@ enum Command {
     ///
     /// Many cars drive for hours.
     Availability(availability::Arguments),
+    /// How often an EPS with limits of its own would fault behind our ECU
+    Eps(eps::Arguments),
     /// What a lost input costs, with a handover and without
     ///
     /// At every instant of bends, at 40 to 130 km/h.
@@ -70,6 +72,7 @@ fn main() -> ExitCode {
     status(cli.files.choose().and_then(|()| match &cli.command {
         Command::Faults(arguments) => faults::run(arguments),
         Command::Availability(arguments) => availability::run(arguments),
+        Command::Eps(arguments) => eps::run(arguments),
         Command::Handover(arguments) => handover::run(arguments),
         Command::Reliance(arguments) => reliance::run(arguments),
         Command::Validate(arguments) => validate::run(arguments),
