@@ -190,7 +190,7 @@ mod tests {
         all
     }
 
-    /// With other features a package and all that use it would be compiled once more.
+    /// A package with other features would be compiled once more, and all that use it too.
     #[test]
     fn what_the_first_command_has_compiled_is_not_compiled_for_xtask_and_wheel() {
         let first = features("-p host-sim");

@@ -9,7 +9,6 @@
 
 pub mod availability;
 mod declared;
-pub mod eps;
 pub mod estimates;
 pub mod handover;
 pub mod real_drives;

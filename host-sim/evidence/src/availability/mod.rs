@@ -16,6 +16,7 @@
 //! Not here: what is missed. `haptic-campaign` injects faults into the same world.
 
 mod drive;
+pub mod eps;
 mod events;
 mod roads;
 mod segment;

@@ -1,7 +1,7 @@
 //! `cargo xtask eps`.
 
 use clap::Args;
-use haptic_evidence::eps::{LIMITS, Row, study};
+use haptic_evidence::availability::eps::{LIMITS, Row, study};
 use haptic_report::document::{Block, Cell, Report, Section, Table};
 use haptic_sim::input::in_range;
 use serde_json::json;

@@ -1,4 +1,4 @@
-//! How often an EPS that faults on limits of its own would leave the guidance alone: segments of [`availability`](crate::availability),
+//! How often an EPS that faults on limits of its own would leave the guidance alone: segments of [`availability`](super),
 //! in which nothing is wrong, heard as such an EPS hears them, by a frame every 10 ms while guidance acts.
 //!
 //! Others found the limits on the road, in units of their cars; how these become N.m is a guess of ours. The drive goes on behind a fault, in
@@ -14,7 +14,7 @@ use haptic_sim::guidance::OverBus;
 use haptic_sim::worlds::WORLDS;
 use serde::Serialize;
 
-use crate::availability::{Listener, ROADS, SEGMENT_S, SegmentNumber};
+use super::{Listener, ROADS, SEGMENT_S, SegmentNumber};
 
 /// Worlds, in the order of theirs.
 const DRIVEN: [&str; 3] = ["calibrated", "everything", "bar"];
