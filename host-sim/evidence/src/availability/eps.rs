@@ -109,7 +109,7 @@ fn drive(segment: &SegmentNumber, seed: u64) -> Result<[Seen; LIMITS.len()], Stu
 /// Drives so many hours on each road of each of three worlds.
 ///
 /// # Errors
-/// As [`SegmentNumber::scenario`].
+/// What [`SegmentNumber::scenario`] says.
 pub fn study(hours: f64, seed: u64, watch: &Watch<'_>) -> Result<Vec<Row>, StudyError> {
     let count = (hours * 3600.0 / SEGMENT_S).ceil() as u32;
     let mut segments = Vec::new();

@@ -104,13 +104,13 @@ impl Scenario {
     /// A scenario from what its file says, as [`Scenario::from_toml`] gives it from the text.
     ///
     /// # Errors
-    /// As [`Scenario::from_toml`].
+    /// What [`Scenario::from_toml`] says of that text.
     pub fn from_table(
         name: &str,
         table: Table,
         course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
-        // Of a table that is refused the reader of texts says why.
+        // Why a table is refused, the reader of texts says better.
         let read = table.clone().try_into();
         let file = read.or_else(|_| parse_toml(name, &table.to_string()))?;
         let builder = file::values(name, file, course)?;
