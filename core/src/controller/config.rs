@@ -81,7 +81,7 @@ impl Config {
 
     /// The law; `None` where the memory is damaged.
     #[must_use]
-    pub const fn law(&self) -> Option<Law> {
+    pub const fn law(&self) -> Option<Law<'_>> {
         self.law.law()
     }
 
@@ -118,7 +118,7 @@ impl Config {
         let v = &p.vehicle;
         let between_us = (f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32;
         Self {
-            law: LawWords::new(law(p)),
+            law: law(p),
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
                 wind_up: TorqueRate::from_nm_per_s(p.wind_up_nm_per_s),
@@ -157,22 +157,22 @@ const fn first_error(checks: &[Result<(), ParamError>]) -> Result<(), ParamError
 }
 
 /// The law of parameters that are in range.
-const fn law(p: &Params) -> Law {
-    let coefficients = Coefficients {
+const fn law(p: &Params) -> LawWords {
+    let coefficients = &Coefficients {
         e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
         e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
         e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
         e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
         tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
     };
-    if p.law == DRIVER_ACTIVITY {
+    LawWords::new(if p.law == DRIVER_ACTIVITY {
         Law::DriverActivity {
             coefficients,
             least_share: Ratio::from_si(p.activity_lambda_min),
         }
     } else {
         Law::Paper(coefficients)
-    }
+    })
 }
 
 /// 2^32 turns for each second's 10^6 microseconds.

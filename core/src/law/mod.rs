@@ -34,22 +34,22 @@ use crate::safety::redundant::words;
 
 /// The guidance law that the parameters choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Law {
+pub enum Law<'a> {
     /// Equation (9), the paper's law.
-    Paper(Coefficients),
+    Paper(&'a Coefficients),
     /// A share of equation (9): less to a driver who works against it ([`activity`]).
     DriverActivity {
         /// Equation (9).
-        coefficients: Coefficients,
+        coefficients: &'a Coefficients,
         /// lambda_min, the share that is left in any case.
         least_share: Ratio,
     },
 }
 
-impl Law {
+impl<'a> Law<'a> {
     /// Equation (9), of which each law gives all or a share.
     #[must_use]
-    pub const fn coefficients(&self) -> &Coefficients {
+    pub const fn coefficients(&self) -> &'a Coefficients {
         match self {
             Self::Paper(coefficients) | Self::DriverActivity { coefficients, .. } => coefficients,
         }
@@ -73,28 +73,22 @@ const DRIVER_ACTIVITY: u32 = 1;
 impl LawWords {
     /// The words of a law.
     #[must_use]
-    pub const fn new(law: Law) -> Self {
-        match law {
-            Law::Paper(coefficients) => Self {
-                variant: PAPER,
-                coefficients,
-                least_share: Ratio::ZERO,
-            },
-            Law::DriverActivity {
-                coefficients,
-                least_share,
-            } => Self {
-                variant: DRIVER_ACTIVITY,
-                coefficients,
-                least_share,
-            },
+    pub const fn new(law: Law<'_>) -> Self {
+        let (variant, least_share) = match law {
+            Law::Paper(_) => (PAPER, Ratio::ZERO),
+            Law::DriverActivity { least_share, .. } => (DRIVER_ACTIVITY, least_share),
+        };
+        Self {
+            variant,
+            coefficients: *law.coefficients(),
+            least_share,
         }
     }
 
     /// The law; `None` where the memory is damaged, as no law has this variant.
     #[must_use]
-    pub const fn law(&self) -> Option<Law> {
-        let coefficients = self.coefficients;
+    pub const fn law(&self) -> Option<Law<'_>> {
+        let coefficients = &self.coefficients;
         match self.variant {
             PAPER => Some(Law::Paper(coefficients)),
             DRIVER_ACTIVITY => Some(Law::DriverActivity {

@@ -27,7 +27,7 @@ use crate::safety::modes::Mode;
 /// One step: what it reads, and what it changes.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
-    pub(super) law: Law,
+    pub(super) law: Law<'a>,
     pub(super) sensor: Sensor<'a>,
     pub(super) now: Instant,
     pub(super) elapsed: Micros,

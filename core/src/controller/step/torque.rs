@@ -120,7 +120,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// The share of (9) that the law leaves where (9) asks for so much.
     fn left_by_law(&mut self, asked: Torque) -> Ratio {
-        match &self.law {
+        match self.law {
             Law::Paper(_) => Ratio::ONE,
             Law::DriverActivity {
                 coefficients,
@@ -136,7 +136,7 @@ impl<I: Injection> Step<'_, I> {
                 };
                 let activity = &mut self.once.activity;
                 activity.step(coefficients, sample);
-                activity.share(*least_share)
+                activity.share(least_share)
             }
         }
     }
