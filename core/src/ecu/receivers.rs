@@ -16,7 +16,7 @@ use crate::safety::monitor::Frames;
 use crate::safety::plausibility::{
     BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible, speeds_agree,
 };
-use crate::safety::redundant::{Redundant, Words};
+use crate::safety::redundant::{Redundant, Words, apart};
 
 /// The column's frames come at this rate.
 const COLUMN_PERIOD_US: u32 = 2000;
@@ -481,10 +481,11 @@ impl Receivers {
     /// Whether no receiver is damaged.
     #[inline(always)]
     pub(super) fn are_intact(&self) -> bool {
-        self.lane.agrees_apart()
-            && self.column.agrees_apart()
-            && self.motion.agrees_apart()
-            && self.request.agrees_apart()
+        let receivers = apart(self);
+        receivers.lane.agrees()
+            && receivers.column.agrees()
+            && receivers.motion.agrees()
+            && receivers.request.agrees()
     }
 
     /// Fills in the inputs of a step, from receivers that are intact into [`Inputs::lost`].

@@ -229,6 +229,7 @@ impl Monitor {
     /// Judges what is about to leave. `true` renews the permission for this millisecond; after the first
     /// `false` it is never renewed.
     #[must_use]
+    #[inline(always)]
     pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)

@@ -148,6 +148,14 @@ pub(crate) fn are_intact<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>)
     a.agrees_apart() && b.agrees_apart()
 }
 
+/// What is addressed from its own start on a 32-bit core.
+#[inline(always)]
+pub(crate) fn apart<T>(guarded: &T) -> &T {
+    #[cfg(target_pointer_width = "32")]
+    let guarded = black_box(guarded);
+    guarded
+}
+
 /// A value and its inverted copy.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
@@ -185,10 +193,7 @@ impl<T: Words> Redundant<T> {
     /// Whether the copies agree, in a function that is never inlined, as [`are_intact`].
     #[inline(always)]
     pub(crate) fn agrees_apart(&self) -> bool {
-        let guarded = self;
-        #[cfg(target_pointer_width = "32")]
-        let guarded = black_box(guarded);
-        guarded.agrees()
+        apart(self).agrees()
     }
 
     /// A new second copy, not inlined either.
