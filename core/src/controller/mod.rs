@@ -45,6 +45,7 @@ pub struct Command {
 
 /// What the controller remembers from step to step.
 #[derive(Debug, Clone)]
+#[repr(C)]
 pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
     once: KeptOnce,

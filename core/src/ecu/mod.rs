@@ -93,20 +93,23 @@ impl Memory {
 }
 
 /// A controller with its bus and its monitor.
+// What each step and each frame reads comes first: a load of a Cortex-M4 reaches 4 KiB from where the ECU begins, and one of a
+// float, of which the background is made, 1 KiB.
 #[derive(Debug, Clone)]
+#[repr(C)]
 pub struct Ecu {
+    background: Background,
+    receivers: Receivers,
+    memory: Redundant<Memory>,
+    monitor: Redundant<Monitor>,
     controller: Controller,
     state: ControllerState,
-    monitor: Redundant<Monitor>,
-    memory: Redundant<Memory>,
-    receivers: Receivers,
     history: FaultHistory,
     reset: ResetCause,
     /// The step and the mode in which the present warning began.
     warned_at: Option<(u32, Mode)>,
     /// A self-test of the monitor is due. Not kept twice: a flipped bit skips one test or adds one.
     is_test_due: bool,
-    background: Background,
 }
 
 /// Warnings and lines of the fault history come every so many steps.
