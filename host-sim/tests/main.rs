@@ -18,9 +18,10 @@ use std::process::{Command, Output};
 use std::sync::{Mutex, PoisonError};
 
 /// Commands of the program behind `cargo xtask`: the documents speak of both programs, and what they print is read alike.
-const EVIDENCE: [&str; 6] = [
+const EVIDENCE: [&str; 7] = [
     "faults",
     "availability",
+    "eps",
     "handover",
     "reliance",
     "validate",
