@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 26] = [
+pub(crate) const BUDGETS: [(&str, usize); 28] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -27,11 +27,13 @@ pub(crate) const BUDGETS: [(&str, usize); 26] = [
     ("host-sim/campaign", 4_150),
     ("host-sim/column", 1_630),
     ("host-sim/evidence", 7_620),
+    ("host-sim/input", 370),
     ("host-sim/log", 5_810),
     ("host-sim/metrics", 550),
     ("host-sim/pil", 2_360),
     ("host-sim/report", 6_540),
-    ("host-sim/sim", 9_750),
+    ("host-sim/road", 2_480),
+    ("host-sim/sim", 6_910),
     ("host-sim/vectorised", 2_900),
     ("host-sim/vehicle", 1_640),
     ("xtask", 7_250),

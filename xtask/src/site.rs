@@ -35,7 +35,14 @@ const REQUIREMENTS: &str = "cargo xtask trace --page";
 const FAULTS: &str = "cargo xtask faults --list";
 const NAMED: &str = "host-sim compare --list ";
 /// Crates that others build upon.
-const CRATES: [&str; 4] = ["haptic-core", "haptic-sim", "haptic-log", "haptic-analysis"];
+const CRATES: [&str; 6] = [
+    "haptic-core",
+    "haptic-input",
+    "haptic-road",
+    "haptic-sim",
+    "haptic-log",
+    "haptic-analysis",
+];
 /// The page that leads out of the book, and to what.
 const INTERFACES: &str = "interfaces.md";
 const LAB: &str = "lab.html";

@@ -41,10 +41,8 @@
 pub mod action;
 pub mod drivers;
 pub mod ecu_events;
-pub mod fields;
 pub mod fork;
 pub mod guidance;
-pub mod input;
 pub mod kind;
 pub mod laws;
 pub mod models;
@@ -52,7 +50,6 @@ pub mod participants;
 pub mod parts;
 pub mod population;
 mod preview;
-mod range;
 pub mod scenario;
 pub mod seeds;
 pub mod share;
@@ -62,5 +59,7 @@ pub mod unguided;
 pub mod worlds;
 
 pub use action::Action;
+pub use haptic_input as input;
+pub use haptic_input::fields;
 pub use scenario::Scenario;
 pub use simulation::{Outcome, Run, Simulation, simulate};

@@ -12,11 +12,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates whose README is checked; the bindings' are checked by their own tools.
-const CRATES: [&str; 16] = [
+const CRATES: [&str; 18] = [
     "core",
     "firmware",
     "firmware/lockstep",
     "host-sim",
+    "host-sim/input",
+    "host-sim/road",
     "host-sim/sim",
     "host-sim/column",
     "host-sim/vectorised",

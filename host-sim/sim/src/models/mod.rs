@@ -10,13 +10,14 @@ pub mod driver;
 pub mod hands_answer;
 pub mod nonlinear;
 pub mod plant;
-pub mod road;
 pub mod sensors;
 pub mod tolerances;
 pub mod torsion_bar;
 pub mod vehicle;
 
 use std::f64::consts::{PI, TAU};
+
+pub use haptic_road as road;
 
 /// One step of the simulation, s: the control period of the ECU, and the grid of every delay and hold.
 pub const STEP_S: f64 = 1e-3;

@@ -348,3 +348,18 @@ fn a_real_world_is_driven_and_stands_in_the_file_of_the_scenario() {
     };
     assert!(sdlp(&run) > 1.5 * sdlp(&crate::simulation::simulate(&ideal)));
 }
+
+/// One rule for every name: the paper's symbol in small letters or words, and behind it the unit.
+#[test]
+fn every_name_ends_with_its_unit_and_begins_with_its_symbol() {
+    let mut count = 0;
+    for field in TABLES.iter().flat_map(|(_, fields)| fields()) {
+        let unit = crate::fields::suffix(field.unit);
+        assert!(field.name.ends_with(&unit), "{field:?}");
+        let symbol = field.symbol.replace('\'', "").to_lowercase();
+        assert!(field.name.starts_with(&symbol), "{field:?}");
+        assert_eq!(field.name, field.name.to_lowercase());
+        count += 1;
+    }
+    assert!(count > 90, "{count}");
+}

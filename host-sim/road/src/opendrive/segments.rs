@@ -6,8 +6,8 @@ use super::geometry::{Geometry, Kind};
 use super::network::Network;
 use super::profile::Profile;
 use super::road::Road;
-use crate::models::road::Segment;
-use crate::models::road::piece::Pose;
+use crate::Segment;
+use crate::piece::Pose;
 
 /// Elements that follow one another as closely as this are one course from the origin on, m and rad.
 const CHAINED: f64 = 1e-6;

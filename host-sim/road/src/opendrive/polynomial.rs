@@ -4,8 +4,8 @@
 //! states, arc length is stretched by the small rest, so that both ends are met.
 
 use super::error::{RoadError, refuse};
-use crate::models::road::centreline::quadrature;
-use crate::models::road::piece::Pose;
+use crate::centreline::quadrature;
+use crate::piece::Pose;
 
 /// A point of the reference line.
 #[derive(Debug, Clone, Copy)]

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::error::{RoadError, refuse};
 use super::network::{Network, Next, Passage, listed};
 use super::road::{Lane, Road};
-use crate::input::InputError;
+use haptic_input::InputError;
 
 /// Lane types that vehicles drive on beside `driving`, for roads that have no lane of that type.
 const OTHER_DRIVEN: [&str; 9] = [

@@ -15,7 +15,7 @@ struct Element {
     width_m: [f64; 2],
 }
 
-pub(in crate::models::road) fn write(course: &Course) -> String {
+pub(crate) fn write(course: &Course) -> String {
     let elements = elements(course);
     let length_m: f64 = elements.iter().map(|element| element.length_m).sum();
     let (mut plan, mut superelevation, mut elevation) = (String::new(), String::new(), String::new());

@@ -3,7 +3,7 @@
 /// Why a file has no lane to drive on: one sentence with the road, the place in it and the reason.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-pub(in crate::models::road) struct RoadError(String);
+pub(crate) struct RoadError(String);
 
 impl From<String> for RoadError {
     fn from(sentence: String) -> Self {

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 use super::Centreline;
 use super::opendrive::{self, LaneChoice, RoadUsed};
 use super::piece::{MAX_COURSE_M, Piece};
-use crate::fields::Field;
-use crate::fields::Range::Between;
-use crate::input::{InputError, RangeError, in_range, parse_toml};
+use haptic_input::fields::Field;
+use haptic_input::fields::Range::Between;
+use haptic_input::{InputError, RangeError, in_range, parse_toml};
 
 /// Name under which the built-in course is asked for.
 pub const PAPER_COURSE: &str = "paper-course";
@@ -151,7 +151,7 @@ struct CourseFile {
 /// A segment as a person writes it, in a course file or in a scenario.
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct SegmentFile {
+pub struct SegmentFile {
     length_m: f64,
     curvature_per_m: Option<f64>,
     curvature_start_per_m: Option<f64>,
@@ -289,11 +289,11 @@ impl Course {
         Self::of_file(name, file.lane_width_m, &file.segment)
     }
 
-    pub(crate) fn of_file(
-        name: &str,
-        lane_width_m: f64,
-        segments: &[SegmentFile],
-    ) -> Result<Self, InputError> {
+    /// Checks the segments of a file; `name` stands for the file in errors and results.
+    ///
+    /// # Errors
+    /// A value out of range (by segment, field, value and range); a quantity that is given twice or by half.
+    pub fn of_file(name: &str, lane_width_m: f64, segments: &[SegmentFile]) -> Result<Self, InputError> {
         let segments = segments.iter().enumerate().map(|(i, segment)| {
             let parsed = segment.parsed();
             parsed.map_err(|e| CourseError::Segment(i + 1, Box::new(e)))

@@ -8,9 +8,9 @@ use roxmltree::Node;
 use super::error::{RoadError, refuse};
 use super::polynomial::{CurvePoint, Polynomial};
 use super::xml::{cubic, number, text};
-use crate::models::road::centreline::quadrature;
-use crate::models::road::piece::MAX_COURSE_M;
-use crate::models::road::piece::Pose;
+use crate::centreline::quadrature;
+use crate::piece::MAX_COURSE_M;
+use crate::piece::Pose;
 
 /// Elements that may stand beside a kind of geometry and mean nothing for it.
 const ADDITIONAL: [&str; 3] = ["userData", "include", "dataQuality"];

@@ -1,4 +1,8 @@
-//! Input that a person wrote (course, scenario, options), and what is wrong with it.
+//! Input that a person wrote (course, scenario, options), and what is wrong with it; and [`fields`], the lists of what tables
+//! may hold. Text in, values out: no file, no thread, no clock.
+
+pub mod fields;
+mod range;
 
 use std::fmt::Display;
 

@@ -9,9 +9,9 @@ use super::error::{RoadError, refuse};
 use super::geometry::Geometry;
 use super::profile::{Cubic, Profile};
 use super::road::{Road, Section};
-use crate::models::road::Segment;
-use crate::models::road::centreline::quadrature;
-use crate::models::road::piece::{Piece, Pose};
+use crate::Segment;
+use crate::centreline::quadrature;
+use crate::piece::{Piece, Pose};
 
 /// Longest piece, m.
 const MAX_PIECE_M: f64 = 0.5;

@@ -11,8 +11,7 @@ mod piece;
 
 pub use centreline::{CONVERGED_M, Cell, MIN_DETERMINANT, OVERRUN_M, Shape};
 pub use centreline::{Centreline, Projection, Tracker};
-pub(crate) use course::SegmentFile;
 pub use course::{COURSE_FIELDS, Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE};
-pub use course::{SEGMENT_FIELDS, Segment};
+pub use course::{SEGMENT_FIELDS, Segment, SegmentFile};
 pub use opendrive::{LaneChoice, RoadUsed};
 pub use piece::{Pose, Surface};
