@@ -30,7 +30,13 @@ pub(crate) fn lane(e_y: i64, e_theta: i64, age: u64) -> [u8; 8] {
 
 /// Driver torque in 2^-12 N.m from bit 12, and other signals above that must not be mixed in.
 fn column(driver: i64) -> [u8; 8] {
-    (((driver as u64) & 0x3_FFFF) << 12 | 0xFFFF_FFFF << 30).to_le_bytes()
+    column_at(driver, -1)
+}
+
+/// With an angle in 0.01 deg.
+fn column_at(driver: i64, angle: i64) -> [u8; 8] {
+    let [driver, angle] = [driver, angle].map(|field| field as u64 & 0x3_FFFF);
+    (driver << 12 | angle << 30 | 0xFFFF << 48).to_le_bytes()
 }
 
 fn monitor(limit_nm: f64) -> Monitor {
@@ -711,6 +717,45 @@ fn behind_a_bar_what_lasts_has_to_be_yielded_to() {
                     "{bar_mnm}: {found:?}"
                 ),
                 None => assert_eq!(found, None, "{bar_mnm} {swings}"),
+            }
+        }
+    }
+}
+
+/// A wheel that slows presses on its bar without hands. By hand: 0.044 kg.m2 at 60 rad/s2 take 2.64 N.m, so that beside 4 N.m of guidance
+/// the bar may have 2.82 + 2.64 N.m; where the wheel is turned faster, at the other sign, no more than 2.82. Angles of 0.01 deg, and of 0.1.
+#[test]
+fn behind_a_bar_a_wheel_that_slows_is_no_hand() {
+    for sign in [1, -1] {
+        for step_deg in [0.01, 0.1] {
+            for period_ms in [1, 2, 10] {
+                for (rad_per_s2, bar_mnm, is_permitted) in [
+                    (-60.0, 5_100, true),
+                    (-60.0, 5_800, false),
+                    (0.0, 2_740, true),
+                    (0.0, 2_900, false),
+                    (60.0, 2_740, true),
+                    (60.0, 2_900, false),
+                ] {
+                    let mut bench = Bench::at(5.0, sign * 16_384);
+                    bench.monitor = behind_a_bar(100.0);
+                    assert!(bench.show(None, Some(column_at(0, 0)), guidance(sign * 16_384, ACTIVE), 1000));
+                    // The guidance turns against the hands, to the side of `sign`.
+                    let shown = |ms: i64| {
+                        let time_s = ms as f64 * 1e-3;
+                        let towards_rad = (12.0 + 0.5 * rad_per_s2 * time_s) * time_s;
+                        let steps = (-(sign as f64) * towards_rad.to_degrees() / step_deg).round();
+                        let angle = (steps * step_deg * 100.0).round() as i64;
+                        column_at(-sign * counts(bar_mnm).0, angle)
+                    };
+                    let refused = (0..350).find(|ms| {
+                        let new = (ms % period_ms == 0).then(|| shown(*ms));
+                        let lane = lane(sign * 32_768, sign * 32_768, 0);
+                        !bench.show(Some(lane), new, guidance(sign * 16_384, ACTIVE), 1000)
+                    });
+                    let case = (sign, step_deg, period_ms, rad_per_s2, bar_mnm);
+                    assert_eq!(refused.is_none(), is_permitted, "{case:?}: {refused:?}");
+                }
             }
         }
     }

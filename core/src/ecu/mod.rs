@@ -243,7 +243,7 @@ impl Ecu {
             at: now,
             count: steps.wrapping_add(1),
         };
-        seal(&mut self.memory, self.receivers.frames.new.lane);
+        seal(&mut self.memory, self.receivers.frames.new);
         // Each accepted frame is shown to the monitor once.
         self.receivers.frames.new = New::default();
         if !permitted {
@@ -363,12 +363,15 @@ impl Ecu {
 
 /// Brings the second copies of what a step changed up to date. Not inlined, as the controller's.
 #[inline(never)]
-fn seal(memory: &mut Redundant<Memory>, is_new_picture: bool) {
+fn seal(memory: &mut Redundant<Memory>, new: New) {
     let memory = black_box(memory);
     memory.seal_part(|memory| &mut memory.step);
     memory.seal_part(|memory| &mut memory.monitor.step);
-    if is_new_picture {
+    if new.lane {
         memory.seal_part(|memory| &mut memory.monitor.lane_state);
+    }
+    if new.column {
+        memory.seal_part(|memory| &mut memory.monitor.wheel);
     }
 }
 

@@ -39,14 +39,18 @@ words! {
         /// the hands' torque needs neither.
         pub(crate) window_us: i32,
         pub(crate) margin_mnm: i32,
+        /// Inertia of the wheel on its bar by the square of [`LAG_MS`], mN.m per mrad; 0 without a bar.
+        pub(crate) wheel_mnm_per_mrad: i32,
     }
 }
 
 words! {
-    /// What the monitor remembers: the part that most steps change, and the part that a picture changes.
+    /// What the monitor remembers: the part that most steps change, the part that a picture changes, and the part that a column with a
+    /// torsion bar changes.
     pub struct MonitorState {
         pub(crate) step: StepState,
         pub(crate) lane_state: LaneState,
+        pub(crate) wheel: WheelState,
     }
 }
 
@@ -86,6 +90,16 @@ words! {
         /// What its position asks for, and what its rates ask for beside.
         position_mnm: i32,
         rate_mnm: i32,
+    }
+}
+
+words! {
+    /// The part that a column with a torsion bar changes.
+    pub(crate) struct WheelState {
+        /// How old the window of driver torques was when the column was last heard.
+        heard_us: i32,
+        /// Its angle behind one lag of [`LAG_MS`], and behind two.
+        lagged_urad: [i32; 2],
     }
 }
 
@@ -164,6 +178,10 @@ pub(crate) const YIELD_MNM_PER_MS: i32 = 64;
 /// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 75 ms, three periods of the slowest
 /// host.
 const PROBE_END_US: i32 = 1_075_000;
+/// Each of two lags behind which a wheel on a bar is accelerated: steps of 0.1 deg leave 4 rad/s2.
+pub(crate) const LAG_MS: i32 = 20;
+/// One count of an angle in the column's frame, 0.01 deg.
+const ANGLE_URAD: i32 = 175;
 /// How many steps the torque may be outside its band.
 pub const ASTRAY_MS: i32 = 20;
 /// In Active no torque may follow from lane data older than this: the age of a sample on arrival, and three periods
@@ -222,6 +240,10 @@ impl MonitorState {
             position_mnm: 0,
             rate_mnm: 0,
         },
+        wheel: WheelState {
+            heard_us: 0,
+            lagged_urad: [0; 2],
+        },
     };
 }
 
@@ -234,7 +256,7 @@ impl Monitor {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if state.observe(evidence, elapsed_us, self.window_us) {
+        if state.observe(evidence, elapsed_us, self) {
             self.update_demand(state);
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
@@ -410,7 +432,7 @@ impl Monitor {
 
 impl MonitorState {
     /// Takes the frames that arrived. Returns whether there is a new lane sample to go by.
-    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32, window_us: i32) -> bool {
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32, monitor: &Monitor) -> bool {
         self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
         self.step.unheard_us = self.step.unheard_us.saturating_add(elapsed_us);
         self.step.aside_us = self.step.aside_us.saturating_sub(elapsed_us).max(0);
@@ -442,13 +464,45 @@ impl MonitorState {
         }
         if frames.new.column {
             let driver = field(&frames.column, 12, 18).saturating_mul(1000) / 4096;
-            self.see_driver(driver, window_us);
+            if monitor.wheel_mnm_per_mrad > 0 {
+                self.see_hands(driver, field(&frames.column, 30, 18), monitor);
+            }
+            self.see_driver(driver, monitor.window_us);
         }
         self.step.probe_left_us = self.step.probe_left_us.saturating_sub(elapsed_us).max(0);
         if frames.new.request && field(&frames.request, 21, 1) != 0 {
             self.step.probe_left_us = PROBE_END_US;
         }
         is_newer
+    }
+
+    /// Takes what the hands do if a bar shows `driver`: beside it they turn the wheel, whose acceleration follows from the angle of its
+    /// column in 0.01 deg.
+    #[inline(never)]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the sum of a lag and a time is above zero"
+    )]
+    fn see_hands(&mut self, driver: i32, angle: i32, monitor: &Monitor) {
+        let angle_urad = angle.saturating_mul(ANGLE_URAD);
+        // A column that was silent for longer than a lag counts as heard a lag ago.
+        let apart_us = self.step.window_us.saturating_sub(self.wheel.heard_us);
+        let apart_ms = (apart_us / 1000).clamp(1, LAG_MS);
+        let follow = |lagged: &mut i32, ahead_urad: i32| {
+            let apart_urad = ahead_urad.saturating_sub(*lagged);
+            let moved_urad = apart_urad.saturating_mul(apart_ms) / (LAG_MS + apart_ms);
+            *lagged = lagged.saturating_add(moved_urad);
+        };
+        let [once, twice] = &mut self.wheel.lagged_urad;
+        follow(once, angle_urad);
+        follow(twice, *once);
+        // Two lags of the acceleration, times the square of a lag.
+        let bent_urad = angle_urad
+            .saturating_sub(once.saturating_mul(2))
+            .saturating_add(*twice);
+        let turning = monitor.wheel_mnm_per_mrad.saturating_mul(bent_urad / 1000);
+        self.see_driver(driver.saturating_add(turning), monitor.window_us);
+        self.wheel.heard_us = self.step.window_us;
     }
 
     /// Takes a driver torque. What is older than two windows does not count.

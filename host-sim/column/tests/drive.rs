@@ -2,9 +2,11 @@
 
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Column, Message};
+use haptic_core::safety::modes::Mode;
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::sensors;
+use haptic_sim::parts::DriverVehicle;
 use haptic_sim::scenario::FailureKind;
 use haptic_sim::{Action, Scenario, Simulation, simulate};
 
@@ -39,6 +41,36 @@ fn the_ecu_drives_the_example_to_its_end_without_a_fault() {
             .channels()
             .any(|channel| channel.name == "assist_torque_nm")
     );
+}
+
+/// The wheel is then turned at up to 15 rad/s, and slows by 100 rad/s2 without hands. A monitor that withdraws its permission latches.
+#[test]
+fn a_driver_who_swerves_meets_no_fault_that_latches() {
+    let mut simulation = Simulation::with(&example(), OverBus::new(example().setup()));
+    for _ in 0..8 {
+        for _ in 0..10_000 {
+            simulation.step(&Action::default());
+        }
+        for (hand_nm, for_ms) in [(6.0, 500), (8.0, 300), (10.0, 200), (12.0, 200)] {
+            for hand_torque_nm in [hand_nm, -hand_nm] {
+                let mut swerves = simulation.clone();
+                let pushed = (0..2000).map(|ms| Action {
+                    hand_torque_nm: if ms < for_ms { hand_torque_nm } else { 0.0 },
+                    ..Action::default()
+                });
+                let mut fastest = 0.0_f64;
+                for action in pushed {
+                    let mode = swerves
+                        .step(&action)
+                        .and_then(|outcome| outcome.status)
+                        .map(|status| status.mode);
+                    assert!(mode != Some(Mode::Fault), "{hand_torque_nm} N.m for {for_ms} ms");
+                    fastest = fastest.max(swerves.driver_vehicle().motion().wheel_rate_rad_per_s.abs());
+                }
+                assert!(fastest > 5.0, "{fastest}");
+            }
+        }
+    }
 }
 
 /// The frame of the column has the bar's reading and the column's angle.

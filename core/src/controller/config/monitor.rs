@@ -2,7 +2,7 @@
 
 use super::LEAST_BAND_NM;
 use crate::controller::params::Params;
-use crate::safety::monitor::{DISTRUSTED, Monitor, YIELD_MNM_PER_MS};
+use crate::safety::monitor::{DISTRUSTED, LAG_MS, Monitor, YIELD_MNM_PER_MS};
 
 /// Half the monitor's band, N.m: how far an honest law may be from the monitor's coarse one. Both take rates from the
 /// same samples, the law with its filter, the monitor over 50 to 60 ms, so that they differ by the change of a rate
@@ -22,9 +22,8 @@ pub(super) const fn monitor_band_nm(p: &Params) -> f64 {
 
 /// How long a bar's torque has to last, us, until guidance has yielded to the hands, and how far it may be beyond theirs meanwhile, mN.m.
 /// After two time constants the observer's three lags have let a third of a torque through; from then on the limit L goes at the rate of
-/// yielding, and the estimate settles: after ten 0.3 % are left. Over a tenth of a second the wheel slows by no more than 30
-/// rad/s2: hands would have had to turn it by 3 rad/s more before (with 8 N.m for 0.2 s it is 25 rad/s2 in the world `bar`). So much of
-/// the torque comes from its friction, damping and inertia, and not from the hands.
+/// yielding, and the estimate settles: after ten 0.3 % are left. The margin is what the wheel's friction, its damping at 3 rad/s and its
+/// inertia at 30 rad/s2 take: by so much the acceleration that the monitor finds may be wrong, in steps of an angle and behind its lags.
 const fn bar_bound(p: &Params) -> [i32; 2] {
     if !p.has_bar() {
         return [0; 2];
@@ -34,6 +33,16 @@ const fn bar_bound(p: &Params) -> [i32; 2] {
     let window_us = 1e6 * (2.0 * each_s + f64::max(8.0 * each_s, yields_s));
     let margin_nm = p.wheel_friction_nm + 3.0 * p.wheel_damping_nm_s + 30.0 * p.wheel_inertia_kg_m2;
     [(window_us + 0.5) as i32, (margin_nm * 1e3 + 0.999) as i32]
+}
+
+/// Inertia by the square of the monitor's lag, N.m per rad; 0 without a bar.
+const fn wheel_mnm_per_mrad(p: &Params) -> i32 {
+    let lag_s = LAG_MS as f64 * 1e-3;
+    if p.has_bar() {
+        (p.wheel_inertia_kg_m2 / (lag_s * lag_s) + 0.5) as i32
+    } else {
+        0
+    }
 }
 
 /// How fast a torque may fall that is allowed to fall so many times as fast as usual. With a bar it may yield as fast to a hand that nobody
@@ -64,6 +73,7 @@ impl Monitor {
             ],
             window_us,
             margin_mnm,
+            wheel_mnm_per_mrad: wheel_mnm_per_mrad(p),
         }
     }
 }

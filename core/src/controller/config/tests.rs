@@ -71,6 +71,7 @@ fn each_parameter_reaches_monitor_and_estimator() {
         // Without a bar every reading is the hands' own.
         window_us: 0,
         margin_mnm: 0,
+        wheel_mnm_per_mrad: 0,
     };
     assert_eq!(monitor, expected);
     assert_eq!((estimator.phase_per_us, estimator.periods), (9878, 5));
