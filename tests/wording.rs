@@ -14,7 +14,7 @@ const TOPS: [&str; 8] = [
 const LEANING: [&str; 5] = ["The same", "Of", "As", "With", "Those"];
 
 /// Crates with comments of that kind from before this rule, and how many at most. A number only ever falls.
-const NOT_YET: [(&str, usize); 1] = [("host-sim/analysis", 12)];
+const NOT_YET: [(&str, usize); 1] = [("host-sim/analysis", 7)];
 
 /// The text of a doc comment's line, and its marker.
 fn doc(line: &str) -> Option<(&str, &str)> {

@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 28] = [
+pub(crate) const BUDGETS: [(&str, usize); 29] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -22,7 +22,7 @@ pub(crate) const BUDGETS: [(&str, usize); 28] = [
     ("firmware", 3_160),
     ("firmware/lockstep", 200),
     ("host-sim", 3_550),
-    ("host-sim/analysis", 9_410),
+    ("host-sim/analysis", 7_200),
     ("host-sim/batch", 10_100),
     ("host-sim/campaign", 4_150),
     ("host-sim/column", 1_630),
@@ -31,12 +31,13 @@ pub(crate) const BUDGETS: [(&str, usize); 28] = [
     ("host-sim/log", 5_810),
     ("host-sim/metrics", 550),
     ("host-sim/pil", 2_360),
+    ("host-sim/recording", 2_210),
     ("host-sim/report", 6_540),
     ("host-sim/road", 2_480),
     ("host-sim/sim", 6_910),
     ("host-sim/vectorised", 2_900),
     ("host-sim/vehicle", 1_640),
-    ("xtask", 7_250),
+    ("xtask", 7_260),
     ("xtask/log", 100),
 ];
 

@@ -35,12 +35,13 @@ const REQUIREMENTS: &str = "cargo xtask trace --page";
 const FAULTS: &str = "cargo xtask faults --list";
 const NAMED: &str = "host-sim compare --list ";
 /// Crates that others build upon.
-const CRATES: [&str; 6] = [
+const CRATES: [&str; 7] = [
     "haptic-core",
     "haptic-input",
     "haptic-road",
     "haptic-sim",
     "haptic-log",
+    "haptic-recording",
     "haptic-analysis",
 ];
 /// The page that leads out of the book, and to what.

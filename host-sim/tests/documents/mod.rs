@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates whose README is checked; the bindings' are checked by their own tools.
-const CRATES: [&str; 18] = [
+const CRATES: [&str; 19] = [
     "core",
     "firmware",
     "firmware/lockstep",
@@ -23,6 +23,7 @@ const CRATES: [&str; 18] = [
     "host-sim/column",
     "host-sim/vectorised",
     "host-sim/log",
+    "host-sim/recording",
     "host-sim/analysis",
     "host-sim/batch",
     "host-sim/campaign",

@@ -22,9 +22,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::log::DriveLog;
 use super::switches::Switches;
 use super::wide::{add_times, dot, lagged, median};
+use haptic_recording::DriveLog;
 
 /// Explained share of T_d above which it tells scales and instants too: gusts of 250 N leave 87 % and make a scale of 0.2 of a right one, a motor's
 /// ripple of 0.06 N.m leaves 98.8 % and makes one of 0.78, and without them it is more than 99.5 %.

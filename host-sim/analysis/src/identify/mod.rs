@@ -3,25 +3,22 @@
 //!
 //! Two estimators share one log, one muscle and one form of result: `noise_model` (the default) and
 //! `paper` (the published way, kept as the baseline it is compared with); `tracking` follows a driver who
-//! changes. A log is a CSV file (`log`), a recording of the bus (`bus_trace`) or a file of another tool (`recording`). Terms: *a_1, a_2, a_3, t_p,
+//! changes. A log is read and checked by `haptic-recording`. Terms: *a_1, a_2, a_3, t_p,
 //! K_d, K_hg, K_nms, t_nms* are the paper's; *gain_i* = (K_d + K_nms)*a_i is what the torque alone can tell of K_d
 //! and a_i; the *remnant* is the part of the driver's torque that no linear model of the inputs explains.
 //!
 //! What is not here: driving (the models do that), sets of drives (the studies), and the command line.
 
 mod balance;
-mod bus_trace;
 mod change;
 mod diagnostics;
 mod lane;
-mod log;
 mod motion;
 mod noise_model;
 mod options;
 mod paper;
 mod pieces;
 mod prepare;
-mod recording;
 mod result;
 mod road;
 mod search;
@@ -34,11 +31,13 @@ mod wheel;
 mod wide;
 
 pub use balance::Balance;
-pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack};
 pub use change::{BLIP_S, Change, Constancy, Power, Shape};
 pub use diagnostics::{autocorrelation, fit_percent};
+pub use haptic_recording::{
+    COLUMNS, DriveLog, HAPTIC_DBC, Layout, LogError, Mapping, Recording, SPEED_COLUMN, Signals, SingleTrack,
+    Table, of_bytes, of_table, open as open_mapped,
+};
 pub use lane::LaneNoise;
-pub use log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 pub use noise_model::{
     INFORMED, Information, LONGEST_DELAY_S, Truth, identify as identify_with_noise_model, information,
 };
@@ -46,7 +45,6 @@ pub use options::{FixError, Options, WHEEL_INERTIA_KG_M2};
 pub use paper::{TABLE_4, identify as identify_as_published};
 pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
-pub use recording::{Layout, Mapping, Signals, Table, of_bytes, of_table, open as open_mapped};
 pub use result::{
     AtTNms, Combination, Correlation, Errors, Identification, InputCorrelation, OwnLine, Parameter,
     Parameters, Refutation, Remnant, Start, Torques, Traces, Whiteness,

@@ -6,10 +6,10 @@
 
 use std::ops::Range;
 
-use super::log::DriveLog;
 use super::result::Refutation;
 use super::verdict::{CERTAIN, SIGNS};
 use super::wide::running_mean;
+use haptic_recording::DriveLog;
 
 /// Span of the running means, s, of the differences, s, and of the blocks that errors are taken from, s.
 const MEAN_S: f64 = 2.0;

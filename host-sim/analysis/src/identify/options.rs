@@ -2,9 +2,9 @@
 
 use haptic_log::near::did_you_mean;
 
-use super::log::DriveLog;
 use super::noise_model::BEND_RAD_S;
 use super::signals::Muscle;
+use haptic_recording::DriveLog;
 
 /// Why a `NAME=VALUE` was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -14,10 +14,10 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::diagnostics;
-use super::log::DriveLog;
 use super::options::{FixError, Options};
 use super::result::{Correlation, Identification, Parameter, Parameters, Start, Traces};
 use super::search::{Bounds, Optimum, Quadratic, covariance, minimise};
+use haptic_recording::DriveLog;
 
 const T_P: usize = 3;
 const K_D: usize = 4;

@@ -8,11 +8,11 @@
 use serde::Serialize;
 
 use super::change::{Change, Constancy, SHORTEST_S, Shape};
-use super::log::DriveLog;
 use super::noise_model::identify_prepared;
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::Identification;
+use haptic_recording::DriveLog;
 
 /// A stretch of a drive with one driver.
 #[derive(Debug, Clone, PartialEq, Serialize)]

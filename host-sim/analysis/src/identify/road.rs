@@ -5,9 +5,9 @@
 //! the turn of one second in bends. The near point, 0.3 s ahead, is 0.7 s behind: a lag of [`SMOOTH_S`] is a part of that, and
 //! takes the noise out. The car's own weaving cancels, so this is the road's and nobody's answer.
 
-use super::log::DriveLog;
 use super::signals::integral;
 use super::wide::lagged;
+use haptic_recording::DriveLog;
 
 /// How far ahead the far and the near point are, s.
 const FAR_S: f64 = 1.0;

@@ -15,10 +15,10 @@
 //! any fraction of a sample, and so is its derivative:
 //! `d/dt_p L[u](t - t_p) = -(u - L[u])(t - t_p) / t_nms`.
 
-use super::log::DriveLog;
 use super::road::road;
 use super::switches::Switches;
 use super::wide::{BLOCK, window};
+use haptic_recording::DriveLog;
 
 /// The muscle of equation (8), taken as known (table 4).
 #[derive(Debug, Clone, Copy, PartialEq)]

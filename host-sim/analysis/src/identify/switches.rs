@@ -5,10 +5,8 @@
 //! switch between its two rows, they tell the instants; where the phase is free, it is the latest one. Where no period
 //! fits, the instant may be any between the rows, and the row itself is taken.
 
-use super::log::DriveLog;
+use haptic_recording::{DriveLog, SWITCH_RATE_NM_S};
 
-/// A torque that changes faster than this, N.m/s, has switched: it is the fastest that the envelope allows.
-pub(super) const SWITCH_RATE_NM_S: f64 = 8.0;
 /// Periods that are tried, s; a shorter one than so many rows would fit anything.
 const PERIOD_STEP_S: f64 = 1e-3;
 const LONGEST_PERIOD_S: f64 = 2.0;

@@ -2,12 +2,12 @@
 //! its own for each stretch. The driver, the muscle and the disturbance are the same in all.
 
 use super::lane::LaneDoubt;
-use super::log::{DriveLog, LogError, refuse};
 use super::noise_model;
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::Identification;
 use super::tracking::{Tracking, follow};
+use haptic_recording::{DriveLog, LogError, refuse};
 
 /// Sample periods that differ by less than this share are the same.
 const SAME_PERIOD: f64 = 1e-4;

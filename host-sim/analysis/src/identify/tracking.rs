@@ -15,12 +15,12 @@
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
-use super::log::DriveLog;
 use super::noise_model::{self, BEND_RAD_S, LONGEST_DELAY_S};
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::Identification;
 use super::signals::{LagWeights, Signals};
+use haptic_recording::DriveLog;
 
 const ARM: usize = 0;
 const REMNANT: usize = 1;

@@ -3,6 +3,7 @@
 //! The order of summation is the same on every processor, and products and sums are rounded apart, so that the result
 //! is too.
 
+pub(crate) use haptic_recording::median;
 use multiversion::multiversion;
 
 /// Partial sums: enough to keep an adder busy that takes four cycles.
@@ -39,14 +40,6 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     let rest: f64 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
     parts.iter().sum::<f64>() + rest
-}
-
-/// The middle one of some values, whose order it changes; zero of none.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    match values.len() {
-        0 => 0.0,
-        n => *values.select_nth_unstable_by(n / 2, f64::total_cmp).1,
-    }
 }
 
 /// `u` through a first-order lag, from its first value.

@@ -10,10 +10,10 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::{COUNT, K_HG, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_NMS_SD_S, T_P, THETA};
-use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
 use crate::identify::prepare::prepare;
 use crate::identify::search::covariance;
+use haptic_recording::DriveLog;
 
 /// A driver and the disturbance, as they are.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

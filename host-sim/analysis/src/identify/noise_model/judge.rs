@@ -576,8 +576,8 @@ fn of_wheel(inertia: f64, options: &Options) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::log::DriveLog;
     use crate::identify::prepare::prepare;
+    use haptic_recording::DriveLog;
 
     /// A gain_2 of 0.001 +- 0.002 is not called identified, whether a line is estimated beside it or not; one of 0.005, a given one and one
     /// that was not identified stay as they are.

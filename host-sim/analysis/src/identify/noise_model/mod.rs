@@ -43,7 +43,6 @@ use std::ops::Range;
 use delays::{Delays, Line};
 pub use information::{INFORMED, Information, Truth, information};
 
-use super::log::DriveLog;
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::{Identification, SAME_LINE, Start};
@@ -51,6 +50,7 @@ use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
 use super::signals::{Muscle, Signals};
 use super::switches::Switches;
 use super::wheel::WheelMotion;
+use haptic_recording::DriveLog;
 
 /// Longest delay that is searched, s: twice table 4's, to hold the paper's inattentive driver (0.5 s).
 pub const LONGEST_DELAY_S: f64 = 0.6;

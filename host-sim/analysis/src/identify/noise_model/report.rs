@@ -15,7 +15,6 @@ use super::{
 };
 use crate::identify::balance::balance;
 use crate::identify::diagnostics;
-use crate::identify::log::DriveLog;
 use crate::identify::options::{FixError, Options};
 use crate::identify::paper::TABLE_4;
 use crate::identify::prepare::Prepared;
@@ -25,6 +24,7 @@ use crate::identify::result::{
 };
 use crate::identify::search::{Bounds, Optimum};
 use crate::identify::verdict;
+use haptic_recording::DriveLog;
 
 /// Place of K_d in table 4.
 const TABLE_4_K_D: usize = 4;

@@ -17,9 +17,9 @@ pub use faults::ColumnFaults;
 pub use stretches::{LeftOut, Reason};
 
 use super::lane::{LaneDoubt, LaneNoise, Smoothed, smooth};
-use super::log::{COLUMNS, DriveLog};
 use super::options::Options;
 use super::wheel::{FIT_ROW_S, WheelMotion};
+use haptic_recording::{COLUMNS, DriveLog};
 
 /// Changes of e_y, e_theta, wheel angle, T_h and T_d below which a sample is never out of line: m, rad, rad, N.m, N.m.
 const LEAST: [f64; 5] = [5e-3, 5e-4, 1e-2, 0.06, 0.06];

@@ -6,9 +6,9 @@ use std::ops::Range;
 use serde::Serialize;
 
 use crate::identify::lane::LaneNoise;
-use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
 use crate::identify::wide::{median, running_mean};
+use haptic_recording::DriveLog;
 
 /// Why a stretch was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -1,6 +1,6 @@
 //! Layouts: what the columns of somebody else's recordings are, as a file says it.
 //!
-//! A layout is TOML (`host-sim/analysis/layouts/`, or a user's own). Its columns are sums of channels times numbers. Columns
+//! A layout is TOML (`host-sim/recording/layouts/`, or a user's own). Its columns are sums of channels times numbers. Columns
 //! `offset_m` (of the lane's centre, left positive, beside the vehicle) and `curvature_1pm` stand for the driver's two points;
 //! `shared` is above 0.5 where an automation steers too. Other names serve the layout's own checks. What those find is refused or
 //! left out here; the rest is a log's columns, which are read and checked as any others.
@@ -26,13 +26,13 @@ use points::{SLOPE_S, slopes, two_points};
 pub use points::{Signals, Table};
 
 const BUILT_IN: [(&str, &str); 5] = [
-    ("openlka", include_str!("../../../../layouts/openlka.toml")),
-    ("openpilot", include_str!("../../../../layouts/openpilot.toml")),
-    ("sadc", include_str!("../../../../layouts/sadc.toml")),
-    ("udacity", include_str!("../../../../layouts/udacity.toml")),
+    ("openlka", include_str!("../../../layouts/openlka.toml")),
+    ("openpilot", include_str!("../../../layouts/openpilot.toml")),
+    ("sadc", include_str!("../../../layouts/sadc.toml")),
+    ("udacity", include_str!("../../../layouts/udacity.toml")),
     (
         "cognitive-driver-model",
-        include_str!("../../../../layouts/cognitive-driver-model.toml"),
+        include_str!("../../../layouts/cognitive-driver-model.toml"),
     ),
 ];
 

@@ -6,9 +6,10 @@
 
 use haptic_log::recording::Lines;
 
-use super::super::switches::SWITCH_RATE_NM_S;
-use super::super::wide::median;
 use super::{GUIDANCE_COLUMN, LogError, SHORTEST_S, refuse, too_short};
+
+/// A torque that changes faster than this, N.m/s, has switched: it is the fastest that the envelope allows.
+pub const SWITCH_RATE_NM_S: f64 = 8.0;
 
 /// Share of a sample period by which a time stamp may miss the even grid: rounding to a millisecond makes it 6 %
 /// at 120 Hz and 12.5 % at 250 Hz.
@@ -214,13 +215,13 @@ impl Grid {
 /// What rows add to a value between them.
 struct Weights {
     first: usize,
-    /// Of the rows from `first` on.
+    /// How much of each row from `first` on.
     weight: [f64; 4],
     count: usize,
 }
 
 impl Weights {
-    /// Of the value at `t` between rows `k` and `k + 1`: on the cubic through four rows, or on the line where there
+    /// Weights of the value at `t` between rows `k` and `k + 1`: on the cubic through four rows, or on the line where there
     /// are not four near each other.
     fn between(time: &[f64], k: usize, t: f64, longest: f64, known: impl Fn(usize) -> bool) -> Self {
         let whole = k >= 1
@@ -262,6 +263,14 @@ impl Weights {
         let rows = self.first.max(later.first)..(self.first + self.count).min(later.first + later.count);
         rows.map(|row| self.weight[row - self.first] * later.weight[row - later.first])
             .sum()
+    }
+}
+
+/// The middle one of some values, whose order it changes; zero of none.
+pub fn median(values: &mut [f64]) -> f64 {
+    match values.len() {
+        0 => 0.0,
+        n => *values.select_nth_unstable_by(n / 2, f64::total_cmp).1,
     }
 }
 

@@ -9,7 +9,7 @@
 //! `guidance_torque_nm` (the torque really applied, probe included), `driver_torque_nm`. Others are ignored.
 
 mod grid;
-pub(super) mod jumps;
+pub(crate) mod jumps;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -20,6 +20,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use grid::{Grid, usual_step};
+pub use grid::{SWITCH_RATE_NM_S, median};
 use haptic_log::recording::{Lines, RecordingError};
 
 use super::bus_trace;
@@ -114,13 +115,17 @@ impl From<String> for LogError {
 }
 
 impl LogError {
-    /// Of a file, an option or a channel, which the text then begins with.
+    /// An error in a file, an option or a channel, which the text then begins with.
     pub(crate) fn in_file(name: impl fmt::Display, error: impl fmt::Display) -> Self {
         Self(format!("{name}: {error}"))
     }
 }
 
-pub(super) fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
+/// Refuses a recording, with the reason.
+///
+/// # Errors
+/// Always: the reason.
+pub fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
     Err(LogError(message.into()))
 }
 
@@ -149,7 +154,7 @@ impl DriveLog {
         Self::from_grid(start_s, dt_s, signals)
     }
 
-    /// The same, of any length.
+    /// A log of signals on an even grid, however long it is.
     fn from_grid(start_s: f64, dt_s: f64, signals: [Vec<f64>; 5]) -> Result<Self, LogError> {
         let [
             e_y_m,
@@ -205,7 +210,7 @@ impl DriveLog {
         Self::read_within(source, manual, &[])
     }
 
-    /// The same where these stretches of the log's time, s, will be used: of a log whose clock was set, the side of the jump
+    /// Reads and checks a log of which these stretches of the log's time, s, will be used: of a log whose clock was set, the side of the jump
     /// that they lie on is read.
     ///
     /// # Errors
@@ -219,15 +224,15 @@ impl DriveLog {
         Ok(of_csv(source, &[], &how)?.0)
     }
 
-    /// Every so many-th row, where there are more than a fit gains from: the least that leaves [`MOST_ROWS`], but not so many
-    /// that fewer than [`LEAST_RATE_HZ`] would remain.
-    pub(crate) fn thinned(self) -> Self {
+    /// Every so many-th row, where there are more than a fit gains from: the least that leaves `MOST_ROWS`, but not so many
+    /// that fewer than `LEAST_RATE_HZ` would remain.
+    pub fn thinned(self) -> Self {
         self.every_so_many_th().begun()
     }
 
     /// By how much more variance a slow sum of the prediction errors has than if they were white, at most: reading off between rows
     /// makes neighbours alike, and the noise model may take up a part of that.
-    pub(crate) fn slow_noise(&self) -> f64 {
+    pub fn slow_noise(&self) -> f64 {
         1.0 + 2.0 * self.resampling.iter().map(|r| r.max(0.0)).sum::<f64>()
     }
 
@@ -250,7 +255,7 @@ impl DriveLog {
     }
 
     /// Leaves the first of so many rows each.
-    pub(crate) fn keep_every(&mut self, every: usize) {
+    pub fn keep_every(&mut self, every: usize) {
         for signal in self.signals_mut() {
             *signal = signal.iter().copied().step_by(every).collect();
         }
@@ -310,7 +315,7 @@ impl DriveLog {
     }
 
     /// Whether the record says that the speed changed by more than a few per cent: the aligning torque then does too.
-    pub(crate) fn changes_speed(&self) -> bool {
+    pub fn changes_speed(&self) -> bool {
         self.speeds_m_per_s
             .is_some_and(|[least, most]| most > ONE_SPEED * least)
     }

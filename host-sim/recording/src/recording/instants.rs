@@ -105,8 +105,8 @@ pub(super) fn at_the_torque(
 mod tests {
     use haptic_log::recording::{Group, Recording, Series};
 
-    use crate::identify::bus_trace;
-    use crate::identify::recording::{Mapping, SPEED_COLUMN, of_channels};
+    use crate::bus_trace;
+    use crate::recording::{Mapping, SPEED_COLUMN, of_channels};
 
     /// A channel in a group of its own: `count` values, one each `period_s` from `start_s` on.
     fn group(name: &str, unit: &str, start_s: f64, period_s: f64, value: impl Fn(usize) -> f64) -> Group {

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 
 use super::heard::Value;
 use super::{ALWAYS, LONGEST_PAUSE_S, NEEDED, RATE_HZ, SLOWEST_M_PER_S, SPEED};
-use crate::identify::log::jumps::{Jump, jump};
-use crate::identify::log::{LogError, refuse};
+use crate::log::jumps::{Jump, jump};
+use crate::log::{LogError, refuse};
 
 /// Shorter gaps are no clock that was set, s: where they fill hours there are many of them.
 const SHORTEST_JUMP_S: f64 = 60.0;

@@ -90,7 +90,7 @@ pub(super) fn usable(
 
 #[cfg(test)]
 mod tests {
-    use crate::identify::log::{COLUMNS, DriveLog};
+    use crate::log::{COLUMNS, DriveLog};
 
     /// 25 s at 100 Hz; the clock is set by so much after row 1199.
     fn text(set_by: f64) -> String {

@@ -29,7 +29,7 @@ use heard::{Heard, Value};
 use survey::Survey;
 
 /// The product's own bus: core/haptic.dbc.
-pub const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
+pub const HAPTIC_DBC: &str = include_str!("../../../../core/haptic.dbc");
 
 /// Rows a second: the camera's.
 const RATE_HZ: f64 = 120.0;
