@@ -9,7 +9,7 @@ use std::{fs, io};
 
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
-pub(crate) const BUDGETS: [(&str, usize); 29] = [
+pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("bench", 400),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
@@ -23,9 +23,10 @@ pub(crate) const BUDGETS: [(&str, usize); 29] = [
     ("firmware/lockstep", 200),
     ("host-sim", 3_550),
     ("host-sim/analysis", 7_200),
-    ("host-sim/batch", 10_100),
+    ("host-sim/batch", 8_830),
     ("host-sim/campaign", 4_150),
     ("host-sim/column", 1_630),
+    ("host-sim/engine", 1_280),
     ("host-sim/evidence", 7_620),
     ("host-sim/input", 370),
     ("host-sim/log", 5_810),

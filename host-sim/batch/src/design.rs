@@ -16,9 +16,9 @@ use serde::Serialize;
 
 use crate::Away;
 use crate::drivers::{Probe, compared, guided_drive, truth_of};
+use crate::engine::recorded;
+use crate::engine::{StudyError, refuse};
 use crate::engine::{Watch, each, logs};
-use crate::error::{StudyError, refuse};
-use crate::recorder::recorded;
 use crate::statistics::{mean, rms};
 
 /// The drives, courses and probes to choose from, and the error to reach.

@@ -8,7 +8,7 @@ use haptic_sim::participants::PublishedDriver;
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
 use serde::Serialize;
 
-use crate::error::StudyError;
+use crate::engine::StudyError;
 use crate::paper::REMNANT_GUIDED_NM;
 
 /// A probe of the controller's.

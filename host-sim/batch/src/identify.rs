@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::RunRecord;
 use super::record::default_window;
 use crate::drivers::identified_driver;
+use crate::engine::StudyError;
 use crate::engine::{Watch, each};
-use crate::error::StudyError;
 use crate::several::{Difference, Population, differences, population};
 use crate::statistics::Confidence;
 use haptic_analysis::identify::{

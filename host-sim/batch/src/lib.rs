@@ -43,24 +43,19 @@ pub mod course;
 pub mod design;
 pub mod design_guidance;
 mod drivers;
-pub mod engine;
-mod error;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;
 pub mod identify;
 mod metrics;
-pub mod paper;
 mod parts;
 mod path;
 mod places;
 pub mod readings;
 mod record;
-mod recorder;
 pub mod run;
 pub mod several;
 mod sobol;
-pub mod statistics;
 pub mod study;
 pub mod sweep;
 
@@ -69,11 +64,11 @@ pub mod stability;
 pub mod vehicle;
 
 pub use away::{Away, left_by_themselves};
-pub use engine::shares;
-pub use error::{StudyError, refuse};
 pub use evaluate::claims;
+pub use haptic_engine as engine;
+pub use haptic_engine::statistics::{Confidence, Mean, Rate};
+pub use haptic_engine::{StudyError, paper, refuse, shares, statistics};
 pub use record::{RunRecord, check_window, peak_m};
-pub use statistics::{Confidence, Mean, Rate};
 
 /// Version and commit of this program, as results name it.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("HAPTIC_COMMIT"));

@@ -9,7 +9,7 @@ use haptic_sim::participants::participants;
 use haptic_sim::scenario::{Scenario, ScenarioError};
 use toml::{Table, Value};
 
-use crate::error::StudyError;
+use crate::engine::StudyError;
 use crate::files::{Source, check_names};
 use crate::path;
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Away;
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 use haptic_core::controller::params::Params;
 use haptic_log::trace::Sample;
 use haptic_metrics::{self as metrics, Asked, Circumstances, Metrics, Window};

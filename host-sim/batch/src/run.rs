@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::RunRecord;
 use super::record::{default_window, failure_notes, nominal_peak_m};
-use crate::error::StudyError;
+use crate::engine::StudyError;
 use crate::readings::Readings;
 use haptic_log::Event;
 use haptic_sim::ecu_events::{EcuEvents, Said};

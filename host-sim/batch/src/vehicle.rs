@@ -9,7 +9,7 @@ use haptic_vehicle::{
     Known, Quantity, VehicleColumns, VehicleIdentification, VehicleLog, Verdict, identify_vehicle,
 };
 
-use crate::error::StudyError;
+use crate::engine::StudyError;
 
 /// Identifies the vehicle of a recording, of which pauses up to `bridge_s` are bridged.
 ///

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Crates whose README is checked; the bindings' are checked by their own tools.
-const CRATES: [&str; 19] = [
+const CRATES: [&str; 20] = [
     "core",
     "firmware",
     "firmware/lockstep",
@@ -25,6 +25,7 @@ const CRATES: [&str; 19] = [
     "host-sim/log",
     "host-sim/recording",
     "host-sim/analysis",
+    "host-sim/engine",
     "host-sim/batch",
     "host-sim/campaign",
     "host-sim/evidence",

@@ -27,8 +27,8 @@ use haptic_sim::input::InputError;
 use haptic_sim::laws::Law;
 use serde::Serialize;
 
+use crate::engine::StudyError;
 use crate::engine::{Watch, each};
-use crate::error::StudyError;
 use crate::files::Source;
 use crate::parts::{Chosen, Kinds};
 use crate::statistics::{Confidence, Mean, mean};

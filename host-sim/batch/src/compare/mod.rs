@@ -26,8 +26,8 @@ use haptic_sim::drivers::AnyDriver;
 use haptic_sim::input::InputError;
 use haptic_sim::laws::Law;
 
+use crate::engine::StudyError;
 use crate::engine::{Watch, each};
-use crate::error::StudyError;
 use crate::files::Source;
 use crate::places::{Drives, seed_of};
 use crate::statistics::Confidence;

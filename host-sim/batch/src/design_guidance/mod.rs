@@ -20,7 +20,7 @@ mod tests;
 use haptic_core::controller::params::Params;
 use std::path::Path;
 
-use crate::error::StudyError;
+use crate::engine::StudyError;
 use crate::files::Source;
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;

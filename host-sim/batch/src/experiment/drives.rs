@@ -8,8 +8,8 @@ use haptic_sim::simulation::Run;
 
 use super::{ExperimentPlan, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, chosen, path_of};
 use crate::Away;
-use crate::error::StudyError;
-use crate::recorder::recorded;
+use crate::engine::StudyError;
+use crate::engine::recorded;
 
 /// A drive with what is needed to judge it.
 pub struct Driven {

@@ -16,8 +16,8 @@ mod drives;
 
 use serde::Serialize;
 
+pub use crate::engine::Recorder;
 pub use crate::paper::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
-pub use crate::recorder::Recorder;
 pub use drives::{Driven, driven, driven_by, guided, scenario_of_drive};
 
 use haptic_analysis::identify::{
@@ -31,8 +31,8 @@ use haptic_sim::scenario::Scenario;
 use crate::Away;
 use crate::drivers::identified_driver;
 pub use crate::drivers::{COMPARED, Compared, Probe, compared, truth_of};
+use crate::engine::StudyError;
 use crate::engine::{Watch, logs, runs};
-use crate::error::StudyError;
 
 /// The paper's trajectory errors with guidance over its participants: smallest, mean, largest, m (4.4).
 pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use haptic_log::trace::Trace;
 
 use super::Session;
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 
 /// Length of the stretches that the probe's amplitude is the median of, s.
 const STRETCH_S: f64 = 4.0;

@@ -29,8 +29,8 @@ pub use order::Order;
 pub use paired::{Difference, of_participants};
 pub use repeated::{Repeated, Test};
 
+use crate::engine::{StudyError, refuse};
 use crate::engine::{Watch, each, runs};
-use crate::error::{StudyError, refuse};
 use crate::files;
 use crate::left_by_themselves;
 use crate::record::RunRecord;

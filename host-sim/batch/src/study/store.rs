@@ -14,7 +14,7 @@ use haptic_sim::simulation::{Ending, Run};
 use serde::{Deserialize, Serialize};
 
 use super::{Session, Source, Study, guidance};
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 use crate::record::{RunRecord, default_window};
 
 /// What a session's directory says of it.

@@ -4,7 +4,7 @@
 use haptic_sim::seeds::{self, Stream};
 
 use super::file::Design;
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 use crate::sobol::{DIMENSIONS, Dimension};
 
 /// Most slices of a Latin hypercube: they are kept in memory.

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 use super::axis::{Axis, Column, Kind};
 use super::value::Distribution;
 use super::vary::varied;
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 use crate::files::one;
 
 /// How sampled fields are drawn.

@@ -33,7 +33,7 @@ mod value;
 mod vary;
 mod vectorised;
 
-pub use crate::error::StoreError;
+pub use crate::engine::StoreError;
 pub use chunk::Chunk;
 pub use drive::Driven;
 pub use effects::{Compared, Effect, Level};
@@ -53,7 +53,7 @@ use haptic_sim::models::road::Course;
 use haptic_sim::scenario::Scenario;
 use toml::{Table, Value};
 
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 use axis::{Axis, Kind};
 use design::Places;
 use file::{SweepFile, definition};

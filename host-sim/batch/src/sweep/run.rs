@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::groups::Moments;
 use super::{Chunk, Store, Sweep};
 use crate::engine::{self, Part, Plan, Study, Watch};
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 
 /// A part of a sweep: every n-th chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! What a varied field takes: values in a list, or a distribution.
 
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 use haptic_sim::input::InputError;
 use statrs::distribution::{ContinuousCDF, Normal};
 use toml::{Table, Value};

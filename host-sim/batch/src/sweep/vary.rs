@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::axis::{Axis, Column, Kind, MOST_VALUES};
 use super::value::Distribution;
-use crate::error::{StudyError, refuse};
+use crate::engine::{StudyError, refuse};
 
 /// One varied field.
 #[derive(Debug, Clone, Default, Deserialize)]

@@ -69,18 +69,18 @@ impl Confidence {
     }
 
     /// What is left out at the upper end, seen from below: 0.975 of 95 %.
-    pub(crate) fn upper(self) -> f64 {
+    pub fn upper(self) -> f64 {
         0.5 + 0.5 * self.0
     }
 
     /// What is left out at the lower end: 0.025 of 95 %, and no 0.02500000000000002.
-    pub(crate) fn lower(self) -> f64 {
+    pub fn lower(self) -> f64 {
         (1e12 * (1.0 - self.upper())).round() / 1e12
     }
 
     /// The level at which several intervals hold all that they are of as often as one of this level holds its own (Bonferroni), to four
     /// digits.
-    pub(crate) fn of_several(self, count: usize) -> Self {
+    pub fn of_several(self, count: usize) -> Self {
         let outside = (1.0 - self.0) / count.max(1) as f64;
         Self((1e4 * (1.0 - outside)).ceil().min(9999.0) / 1e4)
     }
@@ -96,7 +96,7 @@ impl Confidence {
     }
 
     /// How many standard deviations an interval of Student's distribution reaches with so many degrees of freedom; infinite with none.
-    pub(crate) fn student(self, freedom: f64) -> f64 {
+    pub fn student(self, freedom: f64) -> f64 {
         student(self.upper(), freedom)
     }
 
@@ -129,7 +129,8 @@ pub struct Held {
 }
 
 impl Held {
-    pub(crate) fn new(name: &'static str, level: Confidence, ends: [f64; 2]) -> Self {
+    /// An interval of a level, whose field in JSON begins with `name`.
+    pub fn new(name: &'static str, level: Confidence, ends: [f64; 2]) -> Self {
         Self { name, level, ends }
     }
 }
@@ -143,7 +144,7 @@ impl Serialize for Held {
 }
 
 /// The value below which a share of Student's distribution lies; infinite without a degree of freedom.
-pub(crate) fn student(share: f64, freedom: f64) -> f64 {
+pub fn student(share: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |law| law.inverse_cdf(share))
 }
 
@@ -183,7 +184,7 @@ impl Mean {
 
     /// A figure that is no mean of the draws' own, with Tukey's interval from the figures that are left without each draw in turn; none of
     /// fewer than two.
-    pub(crate) fn tukey(whole: f64, left: &[f64], level: Confidence) -> Self {
+    pub fn tukey(whole: f64, left: &[f64], level: Confidence) -> Self {
         let others = left.len() as f64 - 1.0;
         let pseudo: Vec<f64> = left.iter().map(|left| whole + others * (whole - left)).collect();
         let centred = |[low, high]: [f64; 2]| {
@@ -201,7 +202,7 @@ impl Mean {
 
 /// How probable a mean as far from zero as that of these values is, where the mean of all is zero: Student's test of pairs, both sides.
 /// None of fewer than two values, or where nothing scatters.
-pub(crate) fn p_of_zero(values: &[f64]) -> Option<f64> {
+pub fn p_of_zero(values: &[f64]) -> Option<f64> {
     let mean = mean(values.iter().copied())?;
     let deviation = deviation(values, mean).filter(|deviation| *deviation > 0.0)?;
     let count = values.len() as f64;
@@ -231,7 +232,7 @@ impl Serialize for Mean {
 }
 
 /// Standard deviation about their mean, divisor n - 1; none of fewer than two. Equal values have none at all, though their mean is rounded.
-pub(crate) fn deviation(values: &[f64], mean: f64) -> Option<f64> {
+pub fn deviation(values: &[f64], mean: f64) -> Option<f64> {
     let freedom = values.len() as f64 - 1.0;
     let mean = match values {
         [first, rest @ ..] if rest.iter().all(|value| value == first) => *first,
@@ -242,7 +243,7 @@ pub(crate) fn deviation(values: &[f64], mean: f64) -> Option<f64> {
 }
 
 /// Wilson's interval (1927) of a share of so many observations.
-pub(crate) fn wilson(share: f64, count: f64, level: Confidence) -> [f64; 2] {
+pub fn wilson(share: f64, count: f64, level: Confidence) -> [f64; 2] {
     wilson_of(share, count, level.normal())
 }
 
@@ -307,7 +308,7 @@ fn quantile(law: &ChiSquared, share: f64) -> f64 {
 }
 
 /// Where something that holds below ends to hold, by so many halvings: the least value found at which it does not.
-pub(crate) fn halved([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn(f64) -> bool) -> f64 {
+pub fn halved([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..times {
         let middle = 0.5 * (low + high);
         *if holds(middle) { &mut low } else { &mut high } = middle;
@@ -316,7 +317,7 @@ pub(crate) fn halved([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn
 }
 
 /// The places of points that no other point beats: none is at most as large in everything, and smaller in something.
-pub(crate) fn front<const N: usize>(points: &[[f64; N]]) -> Vec<usize> {
+pub fn front<const N: usize>(points: &[[f64; N]]) -> Vec<usize> {
     let beats = |a: &[f64; N], b: &[f64; N]| a.iter().zip(b).all(|(a, b)| a <= b) && a != b;
     let is_on = |place: &usize| !points.iter().any(|other| beats(other, &points[*place]));
     (0..points.len()).filter(is_on).collect()

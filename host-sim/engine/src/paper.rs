@@ -13,7 +13,7 @@ const LAST_STRAIGHT_M: f64 = 400.0;
 
 /// The first curve of the paper's course, every length `k` and every radius `k^2` times as long: at `k` times 60 km/h it is met at
 /// the same time, with the same lateral acceleration of 0.93 m/s2.
-pub(crate) fn stretched_curve(k: f64) -> Result<Course, CourseError> {
+pub fn stretched_curve(k: f64) -> Result<Course, CourseError> {
     let curvature = 1.0 / (300.0 * k * k);
     let (clothoid, arc) = (80.0 * k, 300.0 * k);
     let segments = vec![

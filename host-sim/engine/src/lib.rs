@@ -1,7 +1,8 @@
-//! The engine of all studies: what is driven, what is kept of each drive, and what is made of all, as one value.
+//! The engine of all studies: what is driven, what is kept of each drive, and what is made of all, as one value; and what else all
+//! studies share: [`StudyError`], the [`Recorder`] of the host computer's log, [`statistics`], and what of the [`paper`] they drive.
 //!
 //! A [`Study`] plans its *cases*, each of which is a drive or a few that belong together, and says how a *part* of the plan is driven
-//! ([`Part`]) and what it makes of the *rows*, one for each case. [`run()`] does the rest, and nothing else in this crate does:
+//! ([`Part`]) and what it makes of the *rows*, one for each case. [`run()`] does the rest, and nothing else in a study does:
 //!
 //! - threads, and which cases one of them drives at once ([`Driven`]);
 //! - runs side by side in one thread, a hundredth of them held against the shipping ECU ([`Part::side_by_side`]);
@@ -12,8 +13,7 @@
 //! A list of jobs that asks for no more than a row of each is such a study too ([`each`], [`runs`], [`logs`]).
 //!
 //! ```
-//! use haptic_batch::StudyError;
-//! use haptic_batch::engine::{Part, Plan, Study, Watch};
+//! use haptic_engine::{Part, Plan, Study, StudyError, Watch};
 //! use haptic_sim::Scenario;
 //! use haptic_sim::scenario::Condition;
 //!
@@ -49,12 +49,16 @@
 //! Not here: what a metric is (`haptic-analysis`), what is driven (`haptic-sim`), how results look.
 
 mod entries;
+mod error;
+pub mod paper;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod part;
 mod presets;
+mod recorder;
 mod shares;
 mod side_by_side;
+pub mod statistics;
 mod store;
 mod table;
 #[cfg(test)]
@@ -67,13 +71,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use haptic_vectorised::BATCH;
 use rayon::prelude::*;
 
-use crate::error::{StudyError, refuse};
 pub use entries::{Entry, EntryKind, number, text};
+pub use error::{StoreError, StudyError, refuse};
 pub use part::Part;
 pub use presets::{each, logs, runs};
+pub use recorder::{Recorder, recorded};
 pub use shares::shares;
-pub(crate) use side_by_side::Checked;
-pub use side_by_side::Group;
+pub use side_by_side::{Checked, Group};
 pub use store::{Resumed, Store};
 pub use table::Tables;
 pub use trunk::{After, Faults, Trunk, drive_forked, failures, trunk};

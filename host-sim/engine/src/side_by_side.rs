@@ -20,14 +20,14 @@ const FEWEST: usize = BATCH / 4;
 
 /// Which runs are driven twice.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Checked {
+pub struct Checked {
     seed: u64,
     of: u64,
 }
 
 impl Checked {
     /// Which runs of a study of so many are checked, drawn by its seed.
-    pub(crate) fn new(seed: u64, of: u64) -> Self {
+    pub fn new(seed: u64, of: u64) -> Self {
         Self {
             seed: Stream::Design.seed(seed),
             of: of.max(1),
@@ -43,11 +43,11 @@ impl Checked {
 #[derive(Debug, Clone, Copy)]
 pub struct Group<'a> {
     /// Each run's scenario.
-    pub(crate) scenarios: &'a [Scenario],
+    pub scenarios: &'a [Scenario],
     /// Number of the first of them in the study.
-    pub(crate) first: u64,
+    pub first: u64,
     /// Which of the study's are driven twice.
-    pub(crate) checked: Checked,
+    pub checked: Checked,
 }
 
 impl Group<'_> {
@@ -56,7 +56,7 @@ impl Group<'_> {
     ///
     /// # Errors
     /// A run that differs from the shipping ECU's; what `on` says.
-    pub(crate) fn run_batch(
+    pub fn run_batch(
         &self,
         options: Options,
         alone: impl Fn(&Scenario) -> Run,

@@ -12,7 +12,7 @@ use haptic_sim::simulation::{Run, observe};
 use haptic_vectorised::Step;
 
 /// The run of a scenario with the shipping ECU, and its log with the resolution of the sensors.
-pub(crate) fn recorded(scenario: &Scenario) -> (Run, DriveLog) {
+pub fn recorded(scenario: &Scenario) -> (Run, DriveLog) {
     let mut recorder = Recorder::new(true);
     let run = observe(scenario, |outcome| recorder.observe(outcome));
     (run, recorder.into_log())
@@ -49,7 +49,7 @@ impl Recorder {
     }
 
     /// Takes in one step of a vectorised run: without errors of sensors, what is true is what is observed.
-    pub(crate) fn take(&mut self, now: Step) {
+    pub fn take(&mut self, now: Step) {
         let Some(last) = self.last.replace(now) else {
             return;
         };

@@ -89,7 +89,8 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    pub(crate) fn file(path: &Path, error: impl std::fmt::Display) -> Self {
+    /// What is wrong with a file of the directory.
+    pub fn file(path: &Path, error: impl std::fmt::Display) -> Self {
         Self::File(InputError::new(path.display(), error))
     }
 }
