@@ -1,4 +1,4 @@
-//! Input that a person wrote (course, scenario, options), and what is wrong with it; and [`fields`], the lists of what tables
+//! Input that a person wrote (course, scenario, options), and what is wrong with it; and [`mod@fields`], the lists of what tables
 //! may hold. Text in, values out: no file, no thread, no clock.
 
 pub mod fields;

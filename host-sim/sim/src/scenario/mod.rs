@@ -1,6 +1,6 @@
 //! A scenario: everything that decides a run, from a TOML file in which every field has a default.
 //!
-//! Fields bear the paper's symbols and their units ([`crate::fields`]); defaults are tables 7 to 9. Terms: *condition*, how much the driver relies
+//! Fields bear the paper's symbols and their units ([`mod@crate::fields`]); defaults are tables 7 to 9. Terms: *condition*, how much the driver relies
 //! on the guidance (section 5.1): a name for a pair of arm gains, or manual driving. *Failure*: the guidance
 //! torque drops to zero, or its lane preview stops; the driver keeps the gains for one more second and then
 //! drives as manually.
