@@ -1,7 +1,10 @@
 //! A run under way: its loop, its record, and what the page asks of them.
 
+use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
+use haptic_core::bus::messages::{Column, Guidance as GuidanceMessage, Message};
+use haptic_core::controller::config::Config;
+use haptic_core::observer::{Sensor, State};
 use haptic_log::trace::{CHANNELS, Sample, Trace};
 use haptic_metrics::{self as metrics, Circumstances, Metrics, Window, measure};
 use haptic_sim::guidance::{AnyGuidance, Guidance, OwnLaw};
@@ -19,15 +22,18 @@ use crate::LabResult;
 
 /// Numbers of [`Record::now`], by their places: time, arc length, lateral error, heading error, wheel angle, driver torque,
 /// applied torque, mode, limit, warning, e_y and e_theta at the driver's points, speed, wheel rate, steps, diverged, K_hg as
-/// the ECU tells it and its deviation (NaN until it does).
-pub(crate) const NOW: usize = 18;
+/// the ECU tells it and its deviation (NaN until it does), the driver torque as the ECU takes it (NaN without one).
+pub(crate) const NOW: usize = 19;
 /// Which of them are recorded beside the channels of the log.
-const SAID: [usize; 5] = [7, 8, 9, 16, 17];
+const SAID: [usize; 7] = [7, 8, 9, 16, 17, 5, 18];
 
 /// What a run leaves behind.
 pub(crate) struct Record {
     /// The actuator's ear: how the page knows the limit.
     receiver: ReceiverState,
+    config: Config,
+    /// The ECU's ear for the column, its last frame, and what the observer remembers of a bar.
+    column: (ReceiverState, Option<Column>, State),
     pub(crate) trace: Trace,
     said: Vec<[f64; SAID.len()]>,
     pub(crate) now: [f64; NOW],
@@ -76,10 +82,11 @@ impl Run {
                 Loop::Law(Box::new(Simulation::with_driver_vehicle(&scenario, pair, law)))
             }
         };
+        let record = Record::new(scenario.setup().config);
         Ok(Self {
             scenario,
             simulation,
-            record: Record::new(),
+            record,
         })
     }
 
@@ -128,11 +135,13 @@ impl Run {
 }
 
 impl Record {
-    fn new() -> Self {
+    fn new(config: Config) -> Self {
         let mut now = [0.0; NOW];
         now[16..].fill(f64::NAN);
         Self {
             receiver: ReceiverState::TRUSTED,
+            config,
+            column: (ReceiverState::TRUSTED, None, State::NEW),
             trace: Trace {
                 sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
                 samples: Vec::new(),
@@ -152,7 +161,22 @@ impl Record {
         false
     }
 
+    /// The driver torque as the ECU takes it, N.m: what it reads of the frames that it gets, or what its own observer makes of a bar.
+    fn driver_torque_nm(&mut self, frames: &[Frame]) -> Option<f64> {
+        let (receiver, last, observed) = &mut self.column;
+        let frame = frames.iter().find(|frame| frame.id() == Column::ID);
+        let new = frame.and_then(|frame| Column::decode(receiver, frame).ok());
+        *last = new.or(*last);
+        let read = last.as_ref()?.driver_torque;
+        let torque = match self.config.sensor() {
+            Some(Sensor::Bar(observer)) => observer.step(observed, read, new.map(|new| new.wheel_angle)),
+            _ => read,
+        };
+        Some(torque.nm())
+    }
+
     fn take(&mut self, outcome: &Outcome) {
+        let driver_torque_nm = self.driver_torque_nm(outcome.frames_in);
         let now = &mut self.now;
         if let Some(Ok(said)) = outcome
             .frames_out
@@ -165,7 +189,7 @@ impl Record {
             now[7] = f64::from(status.mode as u8);
             now[9] = f64::from(u8::from(status.warning));
             if let Some(reading) = status.k_hg {
-                now[16..].copy_from_slice(&reading);
+                now[16..18].copy_from_slice(&reading);
             }
         }
         if let Some(Sample {
@@ -179,6 +203,7 @@ impl Record {
             (now[1], now[2], now[3]) = (s_m, lateral_error_m, heading_error_rad);
             now[13] = wheel_rate_rad_per_s;
         }
+        now[18] = driver_torque_nm.unwrap_or(f64::NAN);
         let seen = outcome.observation;
         now[0] = outcome.time_s();
         now[4] = seen.wheel_angle_rad;
@@ -193,8 +218,8 @@ impl Record {
         }
     }
 
-    /// The samples of a channel, by its place among the columns of the log; behind them mode, limit, warning, K_hg and its
-    /// deviation.
+    /// The samples of a channel, by its place among the columns of the log; behind them mode, limit, warning, K_hg, its
+    /// deviation, the torque that the column's sensor reads and the driver torque as the ECU takes it.
     pub(crate) fn channel(&self, place: usize) -> Vec<f64> {
         match CHANNELS.get(place) {
             Some(channel) => self.trace.samples.iter().map(channel.value).collect(),
