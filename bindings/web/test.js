@@ -1,6 +1,6 @@
-// Run in the page by `cargo xtask web`; returns a line for each check. EXPECTED: probe.toml, its run.csv and results.json, and
-// the results.json of an evaluation, all of the command line.
-const report = [], [toml, csv, ran, evaluated] = EXPECTED, evaluation = JSON.parse(evaluated);
+// Run in the page by `cargo xtask web`; returns a line for each check. EXPECTED: probe.toml, its run.csv and results.json, the
+// same of bar.toml, the results.json of an evaluation, all of the command line; and examples/torsion-bar.toml.
+const report = [], [toml, csv, ran, bar_toml, bar_csv, bar_ran, evaluated, bar_example] = EXPECTED, evaluation = JSON.parse(evaluated);
 const check = (name, good, what) => report.push(`${good ? "ok" : "FAILED"} ${name}: ${what}`);
 const $ = id => document.getElementById(id), pause = ms => new Promise(done => setTimeout(done, ms));
 async function until(what, good) {
@@ -184,6 +184,44 @@ async function compare() {
   const parsed = new DOMParser().parseFromString(drawn.text, "image/svg+xml"), pixels = await page.png(drawn);
   check("pictures", !parsed.querySelector("parsererror") && parsed.querySelectorAll("polyline").length === 8 && !drawn.text.includes("var(") && pixels.size > 5000,
     `SVG of ${drawn.text.length} bytes, PNG of ${pixels.size} bytes`);
+}
+
+// A drive through a torsion bar, beside the command line's; and A with one, chosen and left again.
+async function bar() {
+  const settings = { t_p: 0.3, k_d: 3, k_hg: 0.5, remnant: 0.1, probe: true, column: "bar" }, text = page.scenario(settings);
+  const told = bar_example.split("\n").filter(line => / = /.test(line) && !line.startsWith("condition")).map(line => line.replace(/ #.*/, "").trim());
+  check("a bar's scenario file", text === bar_toml && told.every(line => text.split("\n").includes(line)), `as bar.toml, with the ${told.length} values of examples/torsion-bar.toml`);
+  const { csv: ours, channels, metrics, now } = await page.drives.ask(page.drives.job(settings, { steps: 1e6, csv: true })), expected = JSON.parse(bar_ran);
+  const lines = bar_csv.trimEnd().split("\n"), names = lines[0].split(","), of = name => lines.slice(1).map(line => Number(line.split(",")[names.indexOf(name)]));
+  const differing = ours.trimEnd().split("\n").filter((line, i) => line !== lines[i]).length;
+  check("command line, bar", differing === 0 && names.includes("bar_torque_nm") && !differ(metrics, expected).length && Object.is(now.k_hg, expected.k_hg.k_hg), `${lines.length} lines of run.csv, ${differing} differ; K_hg ${now.k_hg}`);
+  // The page's lines beside the columns of the command line's log: a digit of rounding; noise and lag of the sensor; the ECU's delay and the steps of its angle.
+  const far = (channel, column) => { const theirs = of(column); return [...channels[channel]].map((value, i) => value - theirs[i]); }, most = (channel, column) => Math.max(...far(channel, column).map(Math.abs));
+  // Of each second the mean: without noise, steps and delay.
+  const slow = channel => { const off = far(channel, "driver_torque_nm"), means = []; for (let i = 0; i + 200 <= off.length; i += 200) means.push(off.slice(i, i + 200).reduce((sum, value) => sum + value / 200, 0)); return Math.hypot(...means) / Math.sqrt(means.length); };
+  check("lines of the bar", most("driver", "driver_torque_nm") < 1e-5 && most("assist", "assist_torque_nm") < 1e-5 && most("read", "bar_torque_nm") < 0.1 && slow("taken") < 0.5 * slow("read"),
+    `sensor at most ${most("read", "bar_torque_nm").toFixed(3)} N.m from T_tb; off the hands, by means of a second, by ${slow("read").toFixed(3)} N.m, the ECU by ${slow("taken").toFixed(3)} N.m`);
+  location.hash = "#step=compare";
+  await pause(100);
+  await settled("compare");
+  const { a } = page.results(), plain = said(), press = async name => { [...document.querySelectorAll(".of-a .chip")].find(chip => chip.textContent === name).click(); await settled("compare"); };
+  check("no bar at first", !page.scenario(page.state().a).includes("[column]") && !page.scenario(page.state().a).includes("torque_sensor") && document.querySelectorAll(".plot").length === 4 && !Number.isFinite(a.channels.assist[0]), plain);
+  await press("torsion bar");
+  const chip = document.querySelector(".of-a [aria-pressed=true]"), plots = [...document.querySelectorAll(".plot svg")].map(plot => plot.getAttribute("aria-label"));
+  check("a bar is chosen", location.hash.includes("a.column=bar") && chip.textContent === "torsion bar" && chip.parentElement.parentElement.getAttribute("aria-label").includes("torsion bar") && plots.length === 5
+    && ["assist", "hands, as the ECU takes them", "bar's sensor", "hands (truth)"].every(name => plots[4].includes(`${name}: at most`)) && /sensor is off the hands' torque by 0\.\d\d N\.m/.test(said()) && said().includes("Left out"), said());
+  const link = location.hash, through = said();
+  await press("sensor of the hands");
+  check("no bar again", page.results().a === a && said() === plain && !location.hash.includes("column") && document.querySelectorAll(".plot").length === 4, location.hash);
+  location.hash = link;
+  await pause(100);
+  await settled("compare");
+  check("a link has the bar", said() === through && page.state().a.column === "bar" && page.state().b.column === "hands", link);
+  location.hash = "#step=compare&a.column=bar&a.guided=false&b.column=steel";
+  await pause(100);
+  await settled("compare");
+  check("a bar by hand", said().includes("no ECU listens") && !plots.at(-1).includes("NaN") && document.querySelectorAll(".plot:nth-child(5) polyline").length === 3 && $("noticed").textContent.includes("b.column"), said());
+  $("read").click();
 }
 
 // Equations (7) and (8) at 1 kHz with a delay of whole milliseconds, and a hand that trembles: a driver whom nobody told the
@@ -435,7 +473,7 @@ async function addresses() {
   const drive = () => ({ driver: one(["own", "1", "9", "17"]), a_1: between(0, 10), a_2: between(0, 10), a_3: between(0, 100), t_p: one([0.001, 0.01, between(0.001, 2), 2]),
     k_hg: one([0, between(0, 10), 10]), k_d: between(0, 50), speed: between(20, 250), guided: one([true, false]), k_1: one([0, between(0, 4), 4]),
     law: one(["shipping", "own", "band"]), fail: one(["none", "torque", "input"]), at: between(0, 1e6), probe: one([true, false]), remnant: between(0, 5),
-    course: one(["bends", "__proto__", "a road & = #%.xodr", "\u00e4 \u2192 \n"]) });
+    column: one(["hands", "bar"]), course: one(["bends", "__proto__", "a road & = #%.xodr", "\u00e4 \u2192 \n"]) });
   let kept = 0;
   for (let k = 0; k < 1000; k++) {
     const state = { step: one(["loop", "reliance", "law", "compare"]), t_p: between(0.001, 2), k_hg: between(0, 10), at: between(0, 1e6), who: one([0.1, 0.3, 0.5]),
@@ -474,7 +512,7 @@ async function addresses() {
 }
 
 return (async () => {
-  for (const part of [story, handovers, probe, compare, drive, feltWheel, law, files, addresses]) {
+  for (const part of [story, handovers, probe, compare, bar, drive, feltWheel, law, files, addresses]) {
     try { await part(); } catch (error) { check(part.name, false, `${error} ${error.stack}`); }
   }
   page.go("failure");

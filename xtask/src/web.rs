@@ -12,8 +12,12 @@ use crate::{dist, venv};
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 const LARGEST_BYTES: u64 = 1_000_000;
 const PAGE: &str = "target/dist/haptic-lab.html";
-/// What the page's test drives too.
-const SCENARIO: &str = "bindings/web/probe.toml";
+/// Two scenarios that the page's test drives too, and the example whose column the second has.
+const SCENARIOS: [&str; 3] = [
+    "bindings/web/probe.toml",
+    "bindings/web/bar.toml",
+    "examples/torsion-bar.toml",
+];
 /// It carries axe-core, which finds what keeps people out of a page; its own dependencies drive browsers.
 const AXE: [&str; 2] = ["--no-deps", "axe-playwright-python==0.1.8"];
 
@@ -64,8 +68,10 @@ fn build(built: Built) -> Result<PathBuf> {
 fn try_it(built: Built) -> Result<()> {
     let place = root().join("target/web");
     let host_sim = built.host_sim()?;
+    let [probe, bar, example] = SCENARIOS;
     for (arguments, out) in [
-        (["run", SCENARIO].as_slice(), "run"),
+        (["run", probe].as_slice(), "run"),
+        (&["run", bar], "bar"),
         (&["evaluate"], "evaluation"),
     ] {
         run(command(&host_sim.to_string_lossy())
@@ -78,11 +84,13 @@ fn try_it(built: Built) -> Result<()> {
     let python = venv::environment_of(&root().join("target/python/page"), &AXE)?;
     let find = "import axe_playwright_python as a; print(a.__path__[0] + '/axe.min.js')";
     let axe = output(command(&python.to_string_lossy()).args(["-c", find]))?;
-    let data = ["run/run.csv", "run/results.json", "evaluation/results.json"].map(|file| place.join(file));
+    let results = |out: &str| place.join(out).join("results.json");
+    let log = |out: &str| place.join(out).join("run.csv");
     let report = output(
         browser("bindings/web/test.js")?
-            .arg(SCENARIO)
-            .args(data)
+            .args([probe.into(), log("run"), results("run")])
+            .args([bar.into(), log("bar"), results("bar")])
+            .args([results("evaluation"), example.into()])
             .args(["--axe", axe.trim()])
             .arg(place.join("pictures")),
     )?;

@@ -2,7 +2,23 @@
 
 const EYES = { a_1: 0.1, a_2: 0.05, a_3: 3.7 }, FIELDS = { a_1: "a_1_rad_per_m", a_2: "a_2_rad_per_m_s", a_3: "a_3" };
 const PLAIN = { driver: "own", ...EYES, t_p: 0.3, k_hg: 0.5, k_d: 3, speed: 60, guided: true, k_1: 0.25, law: "shipping", fail: "none", at: 70, probe: false,
-  remnant: 0, course: "paper-course" };
+  remnant: 0, course: "paper-course", column: "hands" };
+// The bar and the assist of examples/torsion-bar.toml, and what the ECU is told of them.
+const BAR = `[column]
+kind = "torsion-bar"
+j_w_kg_m2 = 0.044
+k_tb_nm_per_rad = 143.24
+upper_friction_nm = 0.1
+lower_friction_nm = 0.3
+angle = "column"
+[assist]
+curve = "medium"
+inject = "overlay"
+`, TOLD = `torque_sensor = 1
+wheel_inertia_kg_m2 = 0.044
+wheel_friction_nm = 0.1
+bar_stiffness_nm_per_rad = 143.24
+`;
 // Roads of the page's own: the first bend within 8 s at 60 km/h.
 const ramp = (length, from, to) => `{length_m = ${length}, curvature_start_per_m = ${from}, curvature_end_per_m = ${to}}`;
 const bend = (length, curvature) => ramp(length, curvature, curvature);
@@ -19,6 +35,8 @@ const dropped = new Map();
 // The paper's drivers lie on this line: who relies on the guidance looks less at the road.
 const onLine = k_hg => ({ k_hg, k_d: 2 + 2 * k_hg });
 
+const hasBar = settings => settings.column === "bar";
+
 function scenario(given, { person = false } = {}) {
   const s = { ...PLAIN, ...given };
   const course = COURSES.get(s.course) ?? JSON.stringify(s.course);
@@ -29,10 +47,10 @@ function scenario(given, { person = false } = {}) {
     text += s.guided ? `k_d_nm_per_rad = ${s.k_d}\nk_hg = ${s.k_hg}\n` : `k_d_nm_per_rad = 4\n`;
   }
   if (s.guided) {
-    text += `[guidance]\nk_1_nm = ${s.k_1}\nprobe = ${s.probe}\n`;
+    text += `[guidance]\nk_1_nm = ${s.k_1}\nprobe = ${s.probe}\n${hasBar(s) ? TOLD : ""}`;
     if (s.fail !== "none" && !person) text += `[failure]\nkind = "${s.fail}"\ntime_s = ${s.at}\n`;
   }
-  return text;
+  return hasBar(s) ? text + BAR : text;
 }
 const isPaper = settings => (settings.course ?? PLAIN.course) === "paper-course";
 // What the command line measures: the first curve of the paper's course, or all of another one.

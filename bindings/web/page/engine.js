@@ -1,10 +1,10 @@
 // The closed loop in WebAssembly, for the page and for its workers. Every number of a drive comes from here.
 
 const CHANNEL = { time: 0, e_y: 1, e_theta: 2, wheel: 3, guidance: 4, driver: 5, error: 6, s: 7, heading: 8, limited: 15,
-  mode: 20, limit: 21, warning: 22, k_hg: 23, deviation: 24 };
+  assist: 19, mode: 20, limit: 21, warning: 22, k_hg: 23, deviation: 24, read: 25, taken: 26 };
 const NOW = ["time_s", "s_m", "lateral_error_m", "heading_error_rad", "wheel_angle_rad", "driver_torque_nm",
   "guidance_torque_nm", "mode", "limit", "warning", "e_y_m", "e_theta_rad", "speed_m_per_s", "wheel_rate_rad_per_s",
-  "steps", "diverged", "k_hg", "deviation"];
+  "steps", "diverged", "k_hg", "deviation", "taken_nm"];
 
 // `law` gets the ten numbers that a law of the page's own sees, and returns its torque.
 async function engine(bytes, law = () => 0) {

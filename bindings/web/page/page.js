@@ -87,12 +87,12 @@ function bandOf({ drive, channel, band, kind }) {
 
 function drawCharts() {
   const width = $("stage").clientWidth, wide = width > 480, panels = view.figure && !wide ? view.panels.filter(panel => panel.mine) : view.panels;
-  const shape = `${S.step} ${panels.length} ${width > 780}`;
+  const shape = `${S.step} ${panels.map(({ broad }) => +!!broad).join("")} ${width > 780}`;
   if ($("charts").dataset.shape !== shape) {
     $("charts").dataset.shape = shape;
     $("charts").className = view.figure && wide ? `charts beside${width > 780 ? "" : " two"}` : `charts of${Math.min(5, panels.length)}`;
-    charts = panels.map(({ still }) => {
-      const host = el("div", { class: still ? "plot instants" : "plot" }), chart = new Chart(host);
+    charts = panels.map(({ still, broad }) => {
+      const host = el("div", { class: still ? "plot instants" : broad ? "plot broad" : "plot" }), chart = new Chart(host);
       host.addEventListener("pointerdown", event => { const at = chart.given?.still ? null : chart.at(event); if (at !== null && !live.going && !event.target.closest(".handle")) clock.at = at; });
       return { host, chart };
     });
@@ -155,7 +155,7 @@ function made(control) {
   }
   const buttons = options(control).map(([value, name]) => el("button", { type: "button", class: "chip", onclick: () => chosen(control, value) }, name));
   control.told = now => buttons.forEach((button, i) => button.setAttribute("aria-pressed", control.options[i][0] === now));
-  return el("div", { class: "control line", role: "group", "aria-label": label }, el("span", { class: "label" }, label), el("span", { class: "chips" }, ...buttons));
+  return el("div", { class: "control line", role: "group", "aria-label": help ? `${label}: ${t(words)}` : label }, el("span", { class: "label" }, label, " ", help), el("span", { class: "chips" }, ...buttons));
 }
 let controls = [];
 function drawControls() {
@@ -230,7 +230,7 @@ function render() {
   if (isLive) drawLive();
   const drawn = keys.filter(key => !view.drives[key].sweep), all = drawn.every(key => results[key]?.metrics), left = keys.filter(key => results[key]?.now?.diverged);
   const asked = isAsked(S), isDriven = drawn.every(key => found[keys.indexOf(key)]);
-  if (all && isDriven && !isLive && !asked) $("said").textContent = [guessed(S, view.right?.(results)), view.says(results), ...left.map(name => t("not_finished", { name, time: results[name].now.time_s.toFixed(1) }))].join(" ").trim();
+  if (all && isDriven && !isLive && !asked) $("said").textContent = [guessed(S, view.right?.(results)), view.says(results), ...left.map(name => t("not_finished", { name: view.numbers ? name.toUpperCase() : name, time: results[name].now.time_s.toFixed(1) }))].join(" ").trim();
   else if (isLive || asked || !missing) $("said").textContent = "";
   if (!missing) document.body.dataset.done = S.step;
   else delete document.body.dataset.done;

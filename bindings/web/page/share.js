@@ -22,7 +22,7 @@ const DRIVERS = ["own", ...Array.from({ length: DELAYS.length + 14 }, (_, i) => 
 const OF_DRIVE = new Map(Object.entries({
   driver: oneOf(...DRIVERS), a_1: within(0, 10), a_2: within(0, 10), a_3: within(0, 100), t_p: within(0.001, 2), k_hg: SHARE, k_d: GAIN, speed: SPEED_KMH,
   guided: oneOf(true, false), k_1: within(0, 4), law: anyText, fail: oneOf("none", "torque", "input"), at: INSTANT_S, probe: oneOf(true, false),
-  remnant: within(0, 5), course: anyText,
+  remnant: within(0, 5), course: anyText, column: oneOf("hands", "bar"),
 }));
 const written = value => Array.isArray(value) ? value.join(" ") : String(value);
 

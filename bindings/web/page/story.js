@@ -25,6 +25,8 @@ function most({ channels }, channel, at) {
   const { s, time } = channels, [from_m, to_m] = windowOf({});
   return channels[channel].reduce((largest, value, i) => s[i] <= to_m && (at === undefined ? s[i] >= from_m : time[i] >= at) ? Math.max(largest, Math.abs(value)) : largest, 0);
 }
+// By how much a channel is off the hands' torque, root mean square.
+const offHands = ({ channels }, channel) => Math.sqrt(channels.driver.reduce((sum, hands, i) => sum + (channels[channel][i] - hands) ** 2, 0) / channels.driver.length);
 const effort = result => result?.metrics?.mean_abs_driver_torque_nm;
 
 const error = (drive, name, kind) => ({ drive, channel: "error", name, kind });
@@ -161,17 +163,20 @@ const STEPS = {
   compare: s => {
     const both = (channel, scale) => ["a", "b"].map(drive => ({ drive, channel, scale, name: drive.toUpperCase(), kind: drive }));
     const of = drive => COMPARED.map(control => ({ ...control, of: drive }));
+    const bars = ["a", "b"].filter(drive => hasBar(s[drive]));
+    const around = drive => ["assist", ...(s[drive].guided ? ["taken"] : []), "read", "driver"].map(channel => ({ drive, channel, name: t(`bar_${channel}`), kind: channel }));
     const probed = ["a", "b"].find(drive => s[drive].probe && s[drive].guided);
     return {
       drives: { a: s.a, b: s.b }, plays: s.shown, whole: true, starts: s.a.course === "paper-course" ? 66 : 20, needle: probed ? s[probed].k_hg : undefined,
       panels: [panel("c_error", "m", both("error")), panel("c_driver", "N.m", both("driver")), panel("c_guidance", "N.m", both("guidance")), panel("c_wheel", "deg", both("wheel", 180 / Math.PI)),
+        ...bars.map(drive => panel("c_bar", "N.m", around(drive), { title: t("c_bar", { who: drive.toUpperCase() }), broad: true })),
         ...(probed ? [panel("c_k_hg", "0 to 1", [{ truth: s[probed].k_hg, name: t("truth"), kind: "manual" }, { drive: probed, channel: "k_hg", name: `${probed.toUpperCase()}, ${t("told")}`, kind: probed, band: "deviation" }], { y: [-0.1, 1.3] })] : [])],
       controls: [choice("shown", [["a", "A"], ["b", "B"]]), ...of("a"), ...of("b")], numbers: true,
       says: ({ a, b }) => {
         const far = { a: f2(peak(a)), b: f2(peak(b)) }, effort_by = effort(b) - effort(a);
         return [t(far.a === far.b ? "said_error_same" : "said_error", far),
           Math.abs(effort_by) < LEAST ? t("said_effort_same", { a: f2(effort(a)) }) : t("said_effort", { by: f2(Math.abs(effort_by)), word: t(effort_by > 0 ? "more_word" : "less_word") }),
-          s.a.remnant || s.b.remnant ? t("said_one_draw") : ""].join(" ").trim();
+          s.a.remnant || s.b.remnant ? t("said_one_draw") : ""].join(" ").trim() + (bars.length ? `\n${saysOfBars(s, bars, { a, b })}` : "");
       },
     };
   },
@@ -186,7 +191,11 @@ const STEPS = {
 };
 // A mode that allows less than the law asks for is what was wanted.
 const NO_LIMIT = 6;
+// How well the hands are told through the bar of each drive that has one, and what such drives leave out.
+const saysOfBars = (s, bars, results) => [...bars.map(drive => t(s[drive].guided ? "said_bar" : "said_bar_alone", { who: drive.toUpperCase(), read: f2(offHands(results[drive], "read")), taken: f2(offHands(results[drive], "taken")) })),
+  bars.some(drive => s[drive].probe && s[drive].guided) ? t("bar_probe") : "", t("bar_left")].filter(Boolean).join(" ");
 const COMPARED = [
+  choice("column", [["hands", "hands"], ["bar", "bar"]]),
   { key: "driver", kind: "select", options: "drivers" },
   slider("t_p", 0.05, 0.8, 0.01, "s"), RESISTS, slider("k_d", 1, 6, 0.1, "N.m/rad"),
   choice("guided", [[true, "on"], [false, "off"]]), slider("k_1", 0.05, 0.5, 0.01, "N.m"),
