@@ -33,7 +33,7 @@ fn column(driver: i64) -> [u8; 8] {
     column_at(driver, -1)
 }
 
-/// With an angle in 0.01 deg.
+/// A column frame whose angle is in 0.01 deg.
 fn column_at(driver: i64, angle: i64) -> [u8; 8] {
     let [driver, angle] = [driver, angle].map(|field| field as u64 & 0x3_FFFF);
     (driver << 12 | angle << 30 | 0xFFFF << 48).to_le_bytes()
