@@ -2,6 +2,9 @@
 //! torque in the next step. And the guard itself, on a value of its own.
 
 use crate::rig::Rig;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
+use haptic_core::ecu::Boot;
 use haptic_core::ecu::injection::Region;
 use haptic_core::quantity::Torque;
 use haptic_core::safety::faults::Fault;
@@ -9,6 +12,11 @@ use haptic_core::safety::modes::Mode;
 use haptic_core::safety::redundant::{Redundant, Words};
 
 fn rigs() -> Vec<Rig> {
+    let bar = Params {
+        torque_sensor: 1.0,
+        ..Params::PAPER
+    };
+    let through_bar = Rig::new(Some(&Setup::new(&bar).unwrap()), Boot::default());
     let standby = Rig::paper();
     let active = Rig::active_in_curve(1.0);
     let mut fade = active.clone();
@@ -17,7 +25,7 @@ fn rigs() -> Vec<Rig> {
     handover.silent[0] = true;
     let coasting = handover.clone();
     handover.run(1000);
-    let mut rigs = vec![standby, active, coasting, fade, handover];
+    let mut rigs = vec![through_bar, standby, active, coasting, fade, handover];
     for rig in &mut rigs {
         rig.run(50);
     }
@@ -28,6 +36,7 @@ fn rigs() -> Vec<Rig> {
 fn every_flip_ends_in_fault_within_a_step() {
     let mut flips = 0;
     for (rig, mode) in rigs().into_iter().zip([
+        Mode::Standby,
         Mode::Standby,
         Mode::Active,
         Mode::Active,
@@ -67,6 +76,14 @@ fn every_flip_ends_in_fault_within_a_step() {
         }
     }
     println!("{flips} flips");
+}
+
+/// Angle and torque of the observer have two words each, rate, bar, friction and *known* one, and all have a second copy.
+#[test]
+fn what_observes_the_hands_is_compared_where_a_bar_is() {
+    let rigs = rigs();
+    let [through_bar, standby] = [&rigs[0], &rigs[1]].map(|rig| rig.ecu.redundant_bits(Region::Controller));
+    assert_eq!(through_bar, standby + 2 * 8 * 32);
 }
 
 /// Two flips do not hide each other, unless they hit the same bit of both copies.

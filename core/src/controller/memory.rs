@@ -5,7 +5,6 @@
 use crate::law::LawState;
 use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
-use crate::observer;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
 use crate::safety::envelope::EnvelopeState;
@@ -30,8 +29,6 @@ words! {
         pub(super) share: Ratio,
         pub(super) coast: Coast,
         pub(super) ramp: Ramp,
-        /// What the observer of the hands' torque remembers, where the sensor is a bar.
-        pub(super) observer: observer::State,
     }
 }
 
@@ -133,7 +130,6 @@ impl Memory {
             share: Ratio::ZERO,
             coast: Coast::NEW,
             ramp: Ramp::NONE,
-            observer: observer::State::NEW,
         }
     }
 
@@ -156,7 +152,6 @@ impl ChangedParts {
     pub(super) const COLUMN: Self = Self(16);
     pub(super) const RAMP: Self = Self(32);
     pub(super) const COAST: Self = Self(64);
-    pub(super) const OBSERVER: Self = Self(128);
 
     pub(super) const fn add(&mut self, part: Self) {
         self.0 |= part.0;
@@ -191,9 +186,6 @@ pub(super) fn seal(guarded: &mut Redundant<Memory>, changed: ChangedParts) {
     }
     if changed.has(ChangedParts::RAMP) {
         guarded.seal_part(|memory| &mut memory.ramp);
-    }
-    if changed.has(ChangedParts::OBSERVER) {
-        guarded.seal_part(|memory| &mut memory.observer);
     }
 }
 

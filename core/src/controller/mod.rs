@@ -13,6 +13,7 @@ mod step;
 use crate::controller::config::Config;
 use crate::controller::injection::{Injection, NoInjection};
 use crate::controller::inputs::Inputs;
+use crate::observer::{self, Sensor};
 use crate::quantity::{Instant, Micros, Torque};
 use crate::safety::envelope::LimitReason;
 use crate::safety::faults::{Fault, FaultSet};
@@ -48,6 +49,8 @@ pub struct Command {
 #[repr(C)]
 pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
+    /// What the observer of the hands' torque remembers. Where the sensor is of the hands nothing reads it, and it is not compared.
+    pub(crate) observer: Redundant<observer::State>,
     once: KeptOnce,
 }
 
@@ -67,6 +70,7 @@ impl ControllerState {
     pub(crate) fn with(mode: Mode, now: Instant) -> Self {
         Self {
             memory: Redundant::new(Memory::new(mode, now)),
+            observer: Redundant::new(observer::State::NEW),
             once: KeptOnce::new(),
         }
     }
@@ -78,6 +82,7 @@ impl ControllerState {
         let mut memory = Memory::new(Mode::Fault, now);
         memory.fast.kept = faults.bits();
         self.memory.set(memory);
+        self.observer.set(observer::State::NEW);
         Command {
             torque: Torque::ZERO,
             probe: None,
@@ -146,6 +151,9 @@ impl Controller {
         let (Some(law), Some(sensor)) = (config.law(), config.sensor()) else {
             return state.lose_memory(now);
         };
+        if matches!(sensor, Sensor::Bar(_)) && !state.observer.agrees_apart() {
+            return state.lose_memory(now);
+        }
         let memory = state.memory.value_mut();
         let elapsed = now.since(memory.fast.last_step);
         memory.fast.last_step = now;
@@ -162,6 +170,7 @@ impl Controller {
             is_late: false,
             hands: None,
             memory,
+            observer: &mut state.observer,
             changed: ChangedParts::NOTHING,
             once: &mut state.once,
         };

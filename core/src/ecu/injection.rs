@@ -10,6 +10,7 @@ use core::ops::{Deref, DerefMut};
 
 use super::{Ecu, Step};
 use crate::controller::injection::Injection;
+use crate::observer::Sensor;
 use crate::quantity::{Instant, Torque};
 use crate::safety::redundant::{Redundant, Words};
 
@@ -94,7 +95,7 @@ impl DerefMut for InjectedEcu {
 pub enum Region {
     /// Gains, limits and margins.
     Config,
-    /// What the controller remembers: mode, law, envelope, plausibility, ramp.
+    /// What the controller remembers: mode, law, envelope, plausibility, ramp, and with a bar the hands.
     Controller,
     /// Inputs, the torque applied, faults, and what the monitor remembers.
     Ecu,
@@ -124,7 +125,12 @@ impl Ecu {
         let mut words = 0;
         match region {
             Region::Config => flip(&mut self.controller.config, bit, &mut words),
-            Region::Controller => flip(&mut self.state.memory, bit, &mut words),
+            Region::Controller => {
+                flip(&mut self.state.memory, bit, &mut words);
+                if let Some(Sensor::Bar(_)) = self.controller.config.value().sensor() {
+                    flip(&mut self.state.observer, bit, &mut words);
+                }
+            }
             Region::Ecu => {
                 flip(&mut self.receivers.lane, bit, &mut words);
                 flip(&mut self.receivers.column, bit, &mut words);

@@ -86,15 +86,14 @@ impl<I: Injection> Step<'_, I> {
     /// The hands' torque by the observer, which begins anew after a lost column.
     #[inline(never)]
     fn observed_hands(&mut self, observer: &Observer) -> Option<Torque> {
-        self.changed.add(ChangedParts::OBSERVER);
-        let state = &mut self.memory.observer;
         let Some(column) = self.inputs.column.value() else {
-            *state = observer::State::NEW;
+            self.observer.set(observer::State::NEW);
             return None;
         };
         let is_new = matches!(self.inputs.column, Input::New(_));
         let angle = is_new.then_some(column.wheel_angle);
-        Some(observer.step(state, column.driver_torque, angle))
+        let step = |state: &mut _| observer.step(state, column.driver_torque, angle);
+        Some(self.observer.amend(step))
     }
 
     /// The angle of the column, which the road wheels follow.

@@ -18,11 +18,12 @@ use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs};
 use crate::lane::LaneSample;
 use crate::law::Law;
-use crate::observer::Sensor;
+use crate::observer::{self, Sensor};
 use crate::quantity::{Instant, Micros, Torque};
 use crate::safety::faults::{Fault, FaultSet};
 use crate::safety::hands::WARN;
 use crate::safety::modes::Mode;
+use crate::safety::redundant::Redundant;
 
 /// One step: what it reads, and what it changes.
 pub(super) struct Step<'a, I> {
@@ -42,6 +43,7 @@ pub(super) struct Step<'a, I> {
     /// The hands' torque, as far as the sensor tells it.
     pub(super) hands: Option<Torque>,
     pub(super) memory: &'a mut Memory,
+    pub(super) observer: &'a mut Redundant<observer::State>,
     pub(super) changed: ChangedParts,
     pub(super) once: &'a mut KeptOnce,
 }
