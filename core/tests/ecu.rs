@@ -942,7 +942,15 @@ fn the_history_goes_round_with_counts_and_ages() {
 
 #[test]
 fn warnings_and_lines_of_the_history_are_counted_and_half_a_turn_apart() {
+    // The fiftieth step of a hundred has a sample of the column.
+    warns_and_tells(0, 51);
+    warns_and_tells(1, 50);
+}
+
+/// Where the drive begins with so many steps more, lines come in this step of a hundred.
+fn warns_and_tells(more: u64, place: u64) {
     let mut rig = Rig::active_in_curve(1.0);
+    (0..more).for_each(|_| drop(rig.step()));
     rig.silent[LANE] = true;
     let counter = |step: &Step, id: u16| {
         let mut frames = step.others.iter().filter(|frame| frame.id() == id);
@@ -956,9 +964,10 @@ fn warnings_and_lines_of_the_history_are_counted_and_half_a_turn_apart() {
         warnings.extend(warns(&step).then(|| counter(&step, Warning::ID)));
         if let Some(counter) = counter(&step, FaultRecord::ID) {
             // Steps count from zero.
-            assert_eq!((rig.ticks - 1) % 100, 50);
+            let at = rig.ticks - 1 + more;
+            assert_eq!(at % 100, place);
             lines += 1;
-            assert_eq!(u64::from(counter), (rig.ticks - 1) / 100 % 16);
+            assert_eq!(u64::from(counter), at / 100 % 16);
         }
     }
     assert_eq!(warnings, [Some(0), Some(1), Some(2), Some(3), Some(4)]);

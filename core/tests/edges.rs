@@ -347,7 +347,7 @@ fn a_motor_is_weak_from_the_fifty_first_step_on() {
 }
 
 /// The monitor's test comes with step 512*k + 1, and stands back by three steps at most from a new sample of the column and
-/// from the fiftieth step of a hundred, which may send a line of the fault history.
+/// from a line of the fault history.
 #[test]
 fn the_monitor_is_tested_in_a_step_with_little_else_to_do() {
     // Whether the column's samples come with odd steps, and the step in which a blind monitor is found.
@@ -355,7 +355,7 @@ fn the_monitor_is_tested_in_a_step_with_little_else_to_do() {
         (false, 1200, 1537),
         (true, 1200, 1538),
         (false, 1700, 2049),
-        // 2049 has a sample, 2050 is a fiftieth, 2051 has a sample.
+        // 2049 has a sample, 2050 has a line, 2051 has a sample.
         (true, 1700, 2052),
     ] {
         let mut rig = Rig::paper();

@@ -108,16 +108,16 @@ pub struct Ecu {
     reset: ResetCause,
     /// The step and the mode in which the present warning began.
     warned_at: Option<(u32, Mode)>,
-    /// A self-test of the monitor is due. Not kept twice: a flipped bit skips one test or adds one.
+    /// A line of the fault history is due, and a self-test of the monitor. Not kept twice: a flipped bit skips one or adds one.
+    is_line_due: bool,
     is_test_due: bool,
 }
 
 /// Warnings and lines of the fault history come every so many steps.
 const TURN: u32 = 100;
-/// The monitor is tested every so many steps: twice a second, or up to [`PATIENCE`] steps later. A step with a new sample
-/// of the column, which is one with most of the frames, has work enough, and one that may send a line of the fault history.
+/// The monitor is tested every so many steps: twice a second.
 const SELF_TEST: u32 = 512;
-/// See [`SELF_TEST`].
+/// For how many steps a line and a test wait for a step without a new sample of the column, which has work enough.
 const PATIENCE: u32 = 3;
 
 impl Ecu {
@@ -169,6 +169,7 @@ impl Ecu {
             history: FaultHistory::new(now),
             reset: boot.reset,
             warned_at: None,
+            is_line_due: false,
             is_test_due: false,
             background: Background::new(setup.estimator),
         }
@@ -217,7 +218,14 @@ impl Ecu {
         let motor = self.receivers.actuator.judge(applied);
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);
         faults.set(motor == Motor::Weak, Fault::MotorWeak);
-        if has_test_come(&mut self.is_test_due, steps, &inputs) {
+        let is_busy = matches!(inputs.column, Input::New(_));
+        let is_line_now = has_come(
+            &mut self.is_line_due,
+            steps.wrapping_sub(TURN / 2) % TURN,
+            is_busy,
+        );
+        let since_test = steps.wrapping_sub(1) % SELF_TEST;
+        if has_come(&mut self.is_test_due, since_test, is_busy || is_line_now) {
             let passes = passes_self_test(monitor, steps / SELF_TEST, injection);
             faults.insert_if(!passes, Fault::SelfTest);
         }
@@ -261,7 +269,7 @@ impl Ecu {
         let sample = sample(&inputs.column, command.hands, now, applied);
         self.background.take(sample, command.probe);
         self.history.step(now, command.faults);
-        let others = self.others(&command, steps);
+        let others = self.others(&command, steps, is_line_now);
         Step {
             command,
             guidance,
@@ -314,14 +322,14 @@ impl Ecu {
         clippy::as_conversions,
         reason = "a counter is cut to its four bits; there are at most 32 lines"
     )]
-    fn others(&mut self, command: &Command, steps: u32) -> Vec<Frame, 2> {
+    fn others(&mut self, command: &Command, steps: u32, is_line_now: bool) -> Vec<Frame, 2> {
         let mut frames = Vec::new();
-        let due = |since: u32| steps.wrapping_sub(since).is_multiple_of(TURN);
         if command.warning {
             let before = self.warned_at.filter(|(_, mode)| *mode == command.mode);
             let (since, _) = *self.warned_at.insert(before.unwrap_or((steps, command.mode)));
-            if due(since) {
-                let counter = steps.wrapping_sub(since) / TURN;
+            let passed = steps.wrapping_sub(since);
+            if passed.is_multiple_of(TURN) {
+                let counter = passed / TURN;
                 let warning = Warning {
                     mode: command.mode,
                     faults: command.faults,
@@ -332,7 +340,7 @@ impl Ecu {
         } else {
             self.warned_at = None;
         }
-        if due(TURN / 2) {
+        if is_line_now {
             let (turn, total) = (steps / TURN, self.history.kinds());
             let index = turn.checked_rem(total);
             let record = index.and_then(|index| self.history.record(index));
@@ -375,15 +383,13 @@ fn seal(memory: &mut Redundant<Memory>, new: New) {
     }
 }
 
-/// Whether the monitor is tested in this step.
+/// Whether work has come whose turn began `since` steps ago.
 #[inline(always)]
-fn has_test_come(is_due: &mut bool, steps: u32, inputs: &Inputs) -> bool {
-    let place = steps % SELF_TEST;
-    if place != 1 && !*is_due {
+fn has_come(is_due: &mut bool, since: u32, is_busy: bool) -> bool {
+    if since != 0 && !*is_due {
         return false;
     }
-    let is_busy = matches!(inputs.column, Input::New(_)) || steps % TURN == TURN / 2;
-    *is_due = is_busy && place <= PATIENCE;
+    *is_due = is_busy && since < PATIENCE;
     !*is_due
 }
 

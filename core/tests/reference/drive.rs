@@ -319,7 +319,7 @@ impl Ecus {
         let sent: Vec<_> = sent
             .map(|frame| (frame.id(), frame.full_data().unwrap()))
             .collect();
-        let expected = self.frames.expected(self.us, &command);
+        let expected = self.frames.expected(self.us, &command, said.has_column);
         assert_eq!(sent, expected, "{}", context());
         self.applied = torque;
         Some(step)

@@ -17,6 +17,7 @@ pub(crate) struct Frames {
     steps: u32,
     /// The step and the mode in which the warning began.
     warned: Option<(u32, Mode)>,
+    is_line_due: bool,
     counts: [u64; 21],
     seen_s: [u64; 21],
     present: u32,
@@ -31,6 +32,7 @@ impl Frames {
             reset,
             steps: 0,
             warned: None,
+            is_line_due: false,
             counts: [0; 21],
             seen_s: [0; 21],
             present: 0,
@@ -40,8 +42,8 @@ impl Frames {
         }
     }
 
-    /// Identifiers and bytes, guidance first.
-    pub(crate) fn expected(&mut self, now: i64, command: &Command) -> Vec<(u16, [u8; 8])> {
+    /// Identifiers and bytes, guidance first; `is_busy`: the step has a new sample of the column.
+    pub(crate) fn expected(&mut self, now: i64, command: &Command, is_busy: bool) -> Vec<(u16, [u8; 8])> {
         let (steps, faults) = (self.steps, command.faults.bits());
         self.steps += 1;
         let bit = |is: bool, place: u32| u64::from(is) << place;
@@ -67,7 +69,12 @@ impl Frames {
                 frames.push((0x0D0, protected(word, 0x66, (steps - since) / 100)));
             }
         }
-        if steps % 100 == 50 && self.ever != 0 {
+        // The fiftieth step of a hundred, or the first of the next three without such a sample, or the third.
+        let place = steps % 100;
+        self.is_line_due |= place == 50;
+        let is_line_now = self.is_line_due && (place == 53 || !is_busy);
+        self.is_line_due &= !is_line_now;
+        if is_line_now && self.ever != 0 {
             let (turn, total) = (steps / 100, self.ever.count_ones());
             let index = turn % total;
             let line = (0..21)

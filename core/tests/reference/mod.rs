@@ -156,6 +156,8 @@ pub(crate) struct Said {
     pub(crate) mode: Mode,
     pub(crate) faults: FaultSet,
     pub(crate) warning: bool,
+    /// A sample of the column came since the last step.
+    pub(crate) has_column: bool,
     /// How close the closest decision was, as a share of its bound.
     pub(crate) closest: f64,
 }
@@ -332,6 +334,7 @@ impl Reference {
             mode: self.mode,
             faults,
             warning,
+            has_column: matches!(seen.column, Input::New(_)),
             closest: CLOSEST.get(),
         }
     }
