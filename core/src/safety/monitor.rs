@@ -13,7 +13,8 @@
 //! an honest change about. While the host asks for the probe, and for a second after, the band is wider by the probe's
 //! amplitude.
 //!
-//! Each rule can be tried by itself: [`Monitor::self_test_vector`].
+//! Each rule can be tried by itself: [`Monitor::self_test_vector`]. One long file, so that all that a permission depends on is read in one
+//! place.
 
 use crate::safety::redundant::words;
 
@@ -39,7 +40,7 @@ words! {
         /// the hands' torque needs neither.
         pub(crate) window_us: i32,
         pub(crate) margin_mnm: i32,
-        /// Inertia of the wheel on its bar by the square of [`LAG_MS`], mN.m per mrad; 0 without a bar.
+        /// Inertia of the wheel on its bar, divided by the square of [`LAG_MS`], mN.m per mrad; 0 without a bar.
         pub(crate) wheel_mnm_per_mrad: i32,
     }
 }
@@ -178,7 +179,8 @@ pub(crate) const YIELD_MNM_PER_MS: i32 = 64;
 /// A probe ends within one of its periods, which is 1 s at most; a request is out of date after 75 ms, three periods of the slowest
 /// host.
 const PROBE_END_US: i32 = 1_075_000;
-/// Each of two lags behind which a wheel on a bar is accelerated: steps of 0.1 deg leave 4 rad/s2.
+/// The acceleration of a wheel on a bar is taken from its angle through two lags of this time: one step of 0.1 deg reads as 5 rad/s2
+/// at most.
 pub(crate) const LAG_MS: i32 = 20;
 /// One count of an angle in the column's frame, 0.01 deg.
 const ANGLE_URAD: i32 = 175;
@@ -464,6 +466,7 @@ impl MonitorState {
         }
         if frames.new.column {
             let driver = field(&frames.column, 12, 18).saturating_mul(1000) / 4096;
+            // A sensor of the hands' torque has no wheel above it: its reading is all that they do.
             if monitor.wheel_mnm_per_mrad > 0 {
                 self.see_hands(driver, field(&frames.column, 30, 18), monitor);
             }
