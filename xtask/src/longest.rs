@@ -231,7 +231,7 @@ impl<'a> Paths<'a> {
         for place in &all {
             costs[*place] = 1;
             if let Some(call) = flows[*place].call {
-                let bytes = self.bytes_of(call, &instructions, &flows, *place);
+                let bytes = self.bytes_of(call, &instructions, &flows, &all, *place);
                 let bytes = bytes.with_context(|| name.clone())?;
                 costs[*place] += self.of_function(call, bytes)?;
             }
@@ -307,6 +307,7 @@ impl<'a> Paths<'a> {
         function: u64,
         instructions: &[Instruction],
         flows: &[Flow],
+        all: &BTreeSet<usize>,
         place: usize,
     ) -> Result<Option<u64>> {
         let name = self.functions.get(&function).map_or("", |(name, _)| name);
@@ -315,7 +316,9 @@ impl<'a> Paths<'a> {
         };
         // Back to where the register gets its constant, as long as nothing jumps in between.
         for at in (0..place).rev() {
-            let is_target = (0..flows.len()).any(|from| from != at && flows[from].next.contains(&(at + 1)));
+            let is_target = all
+                .iter()
+                .any(|from| *from != at && flows[*from].next.contains(&(at + 1)));
             ensure!(!is_target, "{name} of a number of bytes that depends on the way");
             let rest = instructions[at].operands.strip_prefix(register);
             let Some(value) = rest.and_then(|rest| rest.strip_prefix(", ")) else {
