@@ -116,7 +116,7 @@ pub struct Happens {
 use Part::{Assist, Bank, Blind, Braking, Camera, Friction, Gusts, Motor, Slippery, Steep, Wind};
 
 /// Every world, from paper to beyond.
-pub const WORLDS: [WorldKind; 21] = [
+pub const WORLDS: [WorldKind; 23] = [
     world("calibrated", "a calibrated car, flat road, no friction", &[]),
     world(
         "friction",
@@ -152,6 +152,16 @@ pub const WORLDS: [WorldKind; 21] = [
         "bar",
         "a torsion bar with friction of 0.1 and 0.3 N.m, and the medium assist, as in examples/torsion-bar.toml",
         &[Part::Bar],
+    ),
+    more(
+        "bar-everything",
+        "everything, but the column and assist of bar, with their friction",
+        &[Part::Bar],
+    ),
+    more(
+        "bar-braking",
+        "bar-everything, and the speed of braking",
+        &[Part::Bar, Braking],
     ),
     more(
         "camera",
@@ -336,7 +346,8 @@ impl WorldKind {
             car: Some(car),
             ..Tolerances::default()
         };
-        if self.has(Friction) {
+        // A column with a bar has its own.
+        if self.has(Friction) && !self.has_bar() {
             (tolerances.friction_least_nm, tolerances.friction_most_nm) = (0.2, 0.4);
         }
         if self.has(Motor) {
