@@ -54,7 +54,8 @@ impl RunRecord {
             time_s,
             nominal_peak_lateral_error_m: nominal_peak_m,
         });
-        let first_failed = |time_s| run.trace.samples.iter().find(|sample| sample.time_s >= time_s);
+        let samples = &run.trace.samples;
+        let first_failed = |time_s| samples.get(samples.partition_point(|sample| sample.time_s < time_s));
         let circumstances = Circumstances {
             speed_m_s: scenario.speed_m_per_s(),
             lane_width_m: scenario.course().lane_width_m(),

@@ -5,7 +5,7 @@
 //! ([`Part`]) and what it makes of the *rows*, one for each case. [`run()`] does the rest, and nothing else in a study does:
 //!
 //! - threads, and which cases one of them drives at once ([`Driven`]);
-//! - runs side by side in one thread, a hundredth of them held against the shipping ECU ([`Part::side_by_side`]);
+//! - runs side by side in one thread, one in five hundred held against the shipping ECU ([`Part::side_by_side`]);
 //! - progress, and an end on request ([`Watch`]);
 //! - rows of an earlier run that are not driven again, new ones that are kept as soon as they are there, and an end as soon as enough
 //!   is known ([`Store`]).

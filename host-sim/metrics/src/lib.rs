@@ -104,9 +104,6 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
 pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked) -> Metrics {
     let range = samples_in(&trace.samples, circumstances.window);
     let samples = &trace.samples[range.clone()];
-    if samples.is_empty() || !samples.iter().all(is_finite) {
-        return Metrics::default();
-    }
     let count = samples.len() as f64;
     let duration_s = count / trace.sample_rate_hz;
     let half_room_m = (circumstances.lane_width_m - VEHICLE_WIDTH_M) / 2.0;
@@ -119,11 +116,19 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
         mut driver_in_conflict,
     ] = [Moments::default(); 5];
     let [mut out_of_lane, mut limited, mut in_conflict] = [0.0; 3];
+    let [mut speeds, mut slowest, mut fastest] = [0.0, f64::INFINITY, 0.0_f64];
     let torque = |value| without_probe(trace, circumstances.probe_hz, value);
-    let torques = [torque(|s| s.driver_torque_nm), torque(|s| s.guidance_torque_nm)];
-    let speeds = || samples.iter().map(|sample| speed_m_s(sample, circumstances));
+    let torques = circumstances
+        .probe_hz
+        .map(|_| [torque(|s| s.driver_torque_nm), torque(|s| s.guidance_torque_nm)]);
     let mut times_to_crossing_s = Vec::new();
+    let mut are_finite = true;
+    // One pass, as a long trace is read from memory each time.
     for (place, sample) in range.clone().zip(samples) {
+        are_finite &= is_finite(sample);
+        let speed = speed_m_s(sample, circumstances);
+        speeds += speed;
+        (slowest, fastest) = (slowest.min(speed), fastest.max(speed));
         let (t_d, t_h) = (sample.driver_torque_nm, sample.guidance_torque_nm);
         lateral.add(sample.lateral_error_m);
         wheel.add(sample.wheel_angle_rad);
@@ -131,18 +136,20 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
         guidance.add(t_h);
         out_of_lane += f64::from(sample.lateral_error_m.abs() > half_room_m);
         limited += f64::from(sample.guidance_limited);
-        let [t_d, t_h] = torques.each_ref().map(|torque| torque[place]);
+        let (t_d, t_h) = match &torques {
+            Some([driver, guidance]) => (driver[place], guidance[place]),
+            None => (t_d, t_h),
+        };
         if t_d * t_h < 0.0 && t_d.abs().min(t_h.abs()) > CONFLICT_DEAD_BAND_NM {
             in_conflict += 1.0;
             driver_in_conflict.add(t_d);
         }
         if asked.crossings {
-            times_to_crossing_s.push(time_to_crossing_s(
-                sample,
-                speed_m_s(sample, circumstances),
-                half_room_m,
-            ));
+            times_to_crossing_s.push(time_to_crossing_s(sample, speed, half_room_m));
         }
+    }
+    if samples.is_empty() || !are_finite {
+        return Metrics::default();
     }
     let recovery = circumstances
         .failure
@@ -181,9 +188,9 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
         guidance_authority: finite(guidance.sum_abs() / (guidance.sum_abs() + driver.sum_abs())),
         peak_lateral_error_after_failure_m: recovery.peak_lateral_error_m,
         time_to_recover_s: recovery.time_to_recover_s,
-        mean_speed_m_per_s: finite(speeds().sum::<f64>() / count),
-        min_speed_m_per_s: speeds().reduce(f64::min),
-        max_speed_m_per_s: speeds().reduce(f64::max),
+        mean_speed_m_per_s: finite(speeds / count),
+        min_speed_m_per_s: Some(slowest),
+        max_speed_m_per_s: Some(fastest),
     }
 }
 
@@ -284,10 +291,15 @@ struct Recovery {
 fn recovery(samples: &[Sample], failure: &Failure) -> Recovery {
     let start = samples.partition_point(|s| s.time_s < failure.time_s);
     let after = &samples[start..];
-    if !after.iter().all(is_finite) {
+    let (mut are_finite, mut peak_m) = (true, 0.0_f64);
+    for sample in after {
+        are_finite &= is_finite(sample);
+        peak_m = peak_m.max(sample.lateral_error_m.abs());
+    }
+    if !are_finite {
         return Recovery::default();
     }
-    let peak_lateral_error_m = after.iter().map(|s| s.lateral_error_m.abs()).reduce(f64::max);
+    let peak_lateral_error_m = (!after.is_empty()).then_some(peak_m);
     let time_to_recover_s = failure.nominal_peak_lateral_error_m.and_then(|threshold| {
         match after.iter().rposition(|s| s.lateral_error_m.abs() > threshold) {
             None => peak_lateral_error_m.map(|_| 0.0),
