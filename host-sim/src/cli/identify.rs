@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::WHEEL_INERTIA_KG_M2;
 use haptic_batch::identify::{Method, identify, identify_pieces, identify_several};
 use haptic_report::studies::identify::report;
 use haptic_sim::input::in_range;
@@ -32,9 +31,10 @@ pub(super) struct Arguments {
     method: MethodArgument,
     /// The torque was measured by a torsion bar below a steering wheel of this inertia, 0.001 to 0.2: the torque of the hands is made of it
     /// before the fit, from 40 rows a second or more. Weigh the wheel: it counts as known to 10 % (--fix wheel_inertia=J: exactly), and one that
-    /// is much too small makes k_hg false. Without it driver_torque_nm is taken as the torque of the hands
-    #[arg(long, value_name = "KG_M2")]
-    wheel_inertia: Option<f64>,
+    /// is much too small makes k_hg false. "estimate" takes the one that the drive's probe tells, of 0.005 to 0.1, with its interval. Without it
+    /// driver_torque_nm is taken as the torque of the hands
+    #[arg(long, value_name = "KG_M2|estimate")]
+    wheel_inertia: Option<String>,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
     no_lane_smoothing: bool,
@@ -60,14 +60,8 @@ enum MethodArgument {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let mut options = arguments.fit.options(&arguments.recording.reading)?;
-    if let Some(inertia) = arguments.wheel_inertia {
-        let [least, most] = WHEEL_INERTIA_KG_M2;
-        in_range("--wheel-inertia", inertia, least..=most, "kg.m2")?;
-        if options.wheel_inertia.replace(inertia).is_some() {
-            return Err(BadInput::from(
-                "--wheel-inertia and --fix wheel_inertia: once is allowed".to_owned(),
-            ));
-        }
+    if let Some(inertia) = &arguments.wheel_inertia {
+        options.weigh(inertia)?;
     }
     options.lane_noise = !arguments.no_lane_smoothing;
     options.leave_out = !arguments.no_preprocessing;

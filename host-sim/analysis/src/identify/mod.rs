@@ -41,7 +41,7 @@ pub use lane::LaneNoise;
 pub use noise_model::{
     INFORMED, Information, LONGEST_DELAY_S, Truth, identify as identify_with_noise_model, information,
 };
-pub use options::{FixError, Options, WHEEL_INERTIA_KG_M2};
+pub use options::{FixError, Inertia, Options, WHEEL_INERTIA_KG_M2};
 pub use paper::{TABLE_4, identify as identify_as_published};
 pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};

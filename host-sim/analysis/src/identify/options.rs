@@ -11,6 +11,17 @@ use haptic_recording::DriveLog;
 #[error("{0}")]
 pub struct FixError(pub(crate) String);
 
+/// How well a wheel's inertia is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Inertia {
+    /// Give or take 10 %.
+    About,
+    /// Without an error.
+    Exact,
+    /// Not at all: the guidance torque of the drive has to tell it, and what is given is where the search begins.
+    Sought,
+}
+
 /// How a drive is to be identified.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
@@ -26,8 +37,8 @@ pub struct Options {
     pub line: [Option<f64>; 2],
     /// Inertia of the wheel above a torsion bar that measured T_d, kg.m2; none where T_d is the torque of the hands.
     pub wheel_inertia: Option<f64>,
-    /// Whether that is known exactly: otherwise give or take 10 %.
-    pub wheel_inertia_known: bool,
+    /// How well that is known.
+    pub wheel_inertia_is: Inertia,
     /// Damping of that wheel, N.m.s/rad; none where it is not known, so 0 to 0.05.
     pub wheel_damping: Option<f64>,
     /// Stiffness of the bar, N.m/rad, where the angle is that of the column below it; none where it is the wheel's.
@@ -73,7 +84,7 @@ impl Default for Options {
             k_nms_known: false,
             line: [None; 2],
             wheel_inertia: None,
-            wheel_inertia_known: false,
+            wheel_inertia_is: Inertia::About,
             wheel_damping: None,
             bar_stiffness: None,
             assisted: false,
@@ -95,6 +106,8 @@ impl Default for Options {
 
 /// Inertia that a steering wheel may have, kg.m2.
 pub const WHEEL_INERTIA_KG_M2: [f64; 2] = [0.001, 0.2];
+/// Where the search for one that is not known begins, kg.m2.
+const USUAL_INERTIA_KG_M2: f64 = 0.04;
 /// Rows that are farther apart do not tell a wheel's acceleration, s.
 const LONGEST_WHEEL_ROW_S: f64 = 0.025;
 /// Damping of a wheel where nobody says more, N.m.s/rad, and its standard deviation: that of its bearings is 0 to 0.05.
@@ -173,6 +186,30 @@ impl Options {
             .unwrap_or(0.0)
     }
 
+    /// Takes the inertia of a wheel above a torsion bar, kg.m2, or `estimate`.
+    ///
+    /// # Errors
+    /// Neither, or outside [`WHEEL_INERTIA_KG_M2`]; beside one that is fixed; `estimate` of a drive by hand.
+    pub fn weigh(&mut self, text: &str) -> Result<(), FixError> {
+        let [least, most] = WHEEL_INERTIA_KG_M2;
+        let is_sought = text == "estimate";
+        let told = text.parse().ok().filter(|told| (least..=most).contains(told));
+        let refused = if self.wheel_inertia.is_some() {
+            "--fix wheel_inertia is given too, one of them is allowed".to_owned()
+        } else if is_sought && self.manual {
+            "a --manual drive has no guidance torque, which alone tells it".to_owned()
+        } else if !is_sought && told.is_none() {
+            format!("{least} to {most} kg.m2 or \"estimate\" is wanted")
+        } else {
+            self.wheel_inertia = told.or(Some(USUAL_INERTIA_KG_M2));
+            if is_sought {
+                self.wheel_inertia_is = Inertia::Sought;
+            }
+            return Ok(());
+        };
+        Err(FixError(format!("--wheel-inertia {text}: {refused}")))
+    }
+
     /// Takes a `NAME=VALUE` and returns the name.
     ///
     /// # Errors
@@ -217,7 +254,9 @@ impl Options {
             "k_d" => self.k_d = Some(value),
             "k_hg" => self.k_hg = Some(value),
             "k_nms" => (self.muscle.k_nms, self.k_nms_known) = (value, true),
-            "wheel_inertia" => (self.wheel_inertia, self.wheel_inertia_known) = (Some(value), true),
+            "wheel_inertia" => {
+                (self.wheel_inertia, self.wheel_inertia_is) = (Some(value), Inertia::Exact);
+            }
             "wheel_damping" => self.wheel_damping = Some(value),
             "bar_stiffness" => self.bar_stiffness = Some(value),
             "line_offset" => self.line[0] = Some(value),
@@ -365,6 +404,37 @@ mod tests {
         ] {
             let e = o.fix(fix).unwrap_err().to_string();
             assert!(e.contains(says), "{e}");
+        }
+    }
+
+    #[test]
+    fn a_wheel_is_weighed_or_to_be_weighed() {
+        for (text, inertia, is) in [
+            ("0.001", 0.001, Inertia::About),
+            ("0.2", 0.2, Inertia::About),
+            ("estimate", USUAL_INERTIA_KG_M2, Inertia::Sought),
+        ] {
+            let mut o = Options::default();
+            o.weigh(text).unwrap();
+            assert_eq!((o.wheel_inertia, o.wheel_inertia_is), (Some(inertia), is));
+        }
+        let [by_hand, fixed] = [(true, None), (false, Some("wheel_inertia=0.04".to_owned()))]
+            .map(|(manual, fix)| Options::given(manual, &Vec::from_iter(fix)).unwrap());
+        for (mut o, text, says) in [
+            (
+                Options::default(),
+                "0.0009",
+                "0.0009: 0.001 to 0.2 kg.m2 or \"estimate\" is wanted",
+            ),
+            (Options::default(), "0.21", "0.21: 0.001 to 0.2"),
+            (Options::default(), "NaN", "NaN: 0.001 to 0.2"),
+            (Options::default(), "guess", "guess: 0.001 to 0.2"),
+            (by_hand, "estimate", "a --manual drive has no guidance torque"),
+            (fixed.clone(), "0.04", "--fix wheel_inertia is given too"),
+            (fixed, "estimate", "--fix wheel_inertia is given too"),
+        ] {
+            let e = o.weigh(text).unwrap_err().to_string();
+            assert!(e.starts_with("--wheel-inertia ") && e.contains(says), "{e}");
         }
     }
 

@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use super::change::{Change, Constancy, SHORTEST_S, Shape};
-use super::noise_model::identify_prepared;
+use super::noise_model::{identify_prepared, weighed};
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::Identification;
@@ -43,10 +43,8 @@ const MOST: usize = 20;
 
 /// Identifies the driver of each piece of `log`.
 pub fn identify_in_pieces(log: &DriveLog, options: &Options) -> Pieces {
-    let whole = Whole {
-        prepared: prepare(log, options),
-        options,
-    };
+    let (prepared, options) = weighed(options, |options| prepare(log, options));
+    let whole = Whole { prepared, options };
     let [start_s, end_s] = [log.start_s, log.time_s(log.len())];
     let mut changes = Vec::new();
     whole.split([start_s, end_s], &mut changes);
@@ -83,12 +81,12 @@ fn shows(found: Option<&Constancy>, change: &Change) -> bool {
     same.any(|p| p.step.is_some_and(|least| least <= change.by.abs()))
 }
 
-struct Whole<'a> {
+struct Whole {
     prepared: Prepared,
-    options: &'a Options,
+    options: Options,
 }
 
-impl Whole<'_> {
+impl Whole {
     /// The driver between two instants; none if that is too short.
     fn piece(&self, [from_s, to_s]: [f64; 2]) -> Option<Piece> {
         let part = self.prepared.between(from_s, to_s);
@@ -96,7 +94,7 @@ impl Whole<'_> {
             from_s,
             to_s,
             shows_such_changes: true,
-            identification: identify_prepared(&part, self.options),
+            identification: identify_prepared(&part, &self.options),
         })
     }
 

@@ -477,7 +477,7 @@ pub struct Identification {
     pub delay_profile: Vec<[f64; 2]>,
     /// The line that the driver takes; none for the published method, in which it is the target line.
     pub line: Option<OwnLine>,
-    /// What is usually taken as known and was estimated: k_nms, t_nms, t_h_late, t_d_late.
+    /// What is usually taken as known and was estimated: k_nms, t_nms, t_h_late, t_d_late, wheel_inertia.
     pub beyond: Vec<(&'static str, Parameter)>,
     /// Assumptions that the record refutes: with any, nothing is identified.
     pub refuted: Vec<Refutation>,

@@ -51,18 +51,14 @@ fn fitted(logs: &[DriveLog], options: &Options) -> Result<(Prepared, Identificat
             1.0 / other.dt_s
         ));
     }
-    let mut all: Option<Prepared> = None;
-    for log in logs {
-        let next = prepare(log, options);
-        match &mut all {
-            None => all = Some(next),
-            Some(all) => all.append(next),
+    let (prepared, options) = noise_model::weighed(options, |options| {
+        let mut all = prepare(first, options);
+        for log in &logs[1..] {
+            all.append(prepare(log, options));
         }
-    }
-    let Some(prepared) = all else {
-        unreachable!("there is a first log")
-    };
-    let mut found = noise_model::identify_prepared(&prepared, options);
+        all
+    });
+    let mut found = noise_model::identify_prepared(&prepared, &options);
     if logs.len() > 1 {
         found.notes.insert(
             0,

@@ -66,16 +66,14 @@ pub struct Tracking {
 /// Follows the driver of `log`, which goes through the same preflight as for an identification: what is left out there is
 /// left out here. Parameters fixed in `options` stay fixed; of a manual drive K_hg stays zero.
 pub fn track(log: &DriveLog, options: &Options) -> Tracking {
-    let prepared = prepare(log, options);
-    let whole = noise_model::identify_prepared(&prepared, options);
-    follow(&prepared, options, &whole)
+    identify_and_track(log, options).1
 }
 
 /// Identifies the driver of `log` by the noise model, and follows that driver through it.
 pub fn identify_and_track(log: &DriveLog, options: &Options) -> (Identification, Tracking) {
-    let prepared = prepare(log, options);
-    let whole = noise_model::identify_prepared(&prepared, options);
-    let tracking = follow(&prepared, options, &whole);
+    let (prepared, options) = noise_model::weighed(options, |options| prepare(log, options));
+    let whole = noise_model::identify_prepared(&prepared, &options);
+    let tracking = follow(&prepared, &options, &whole);
     (whole, tracking)
 }
 

@@ -452,7 +452,11 @@ fn parameters(found: &Identification, level: Confidence) -> Table {
     } else {
         format!("{level} % from")
     };
-    let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
+    let unit_of = |name: &str| match name {
+        "k_nms" => "N.m/rad",
+        "wheel_inertia" => "kg.m2",
+        _ => "s",
+    };
     let line = found.line.as_ref().filter(|_| found.refuted.is_empty());
     let line = line.map(|line| [("line_offset", "m", &line.offset), ("line_bend", "m", &line.bend)]);
     let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));

@@ -6,15 +6,22 @@ use nalgebra::{DMatrix, DVector};
 use super::delays::{Delays, Line};
 use super::sums::Rows;
 use super::{
-    COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, OWN_BEND, OWN_OFFSET, Problem, T_NMS, T_P,
-    WHEEL,
+    COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, OWN_BEND, OWN_OFFSET, Problem,
+    SOUGHT_KG_M2, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S, T_P, VARIATION_WIDTHS, WHEEL,
 };
-use crate::identify::search::{Quadratic, covariance, step};
+use crate::identify::result::{Parameter, STANDARD_NORMAL_95};
+use crate::identify::search::{Bounds, Optimum, Quadratic, covariance, step};
 
 /// Steps of the delay's profile over the whole range.
 const PROFILE_STEPS: usize = 20;
 /// Length of the blocks over which scores are taken as independent, s.
 const BLOCK_S: f64 = 2.0;
+
+/// K_hg that the derivative by T_h's delay is taken at, at least: it is in proportion to it.
+const LEAST_K_HG: f64 = 0.05;
+
+/// Less than this of a guidance torque is no probe, but may be made of what the remnant did before, N.m.
+pub(super) const LEAST_PROBE_NM: f64 = 0.03;
 
 /// What freeing one assumption would do, to first order.
 #[derive(Debug, Clone)]
@@ -98,6 +105,94 @@ impl Problem<'_> {
             .filter(|&x| !(self.is_free(x) || x == H_LATE && p[K_HG] == 0.0))
             .filter_map(|place| freed(&full, free, place, variance))
             .collect()
+    }
+}
+
+/// What the guidance torque tells of a wheel's inertia.
+pub(super) struct Told {
+    /// How far all parameters are from where they were, the inertia at its place.
+    pub moves: DVector<f64>,
+    /// Variance of the inertia that the disturbance makes.
+    pub variance: f64,
+    /// Root mean square of what the guidance torque has beside the arm's answer to it, behind the filter of the disturbance.
+    pub probe_nm: f64,
+    /// What the inertia moves by for each unit of another parameter.
+    pub slopes: DVector<f64>,
+}
+
+impl Problem<'_> {
+    /// What the guidance torque tells of the wheel's inertia; none where it turns no wheel. The remnant turns the wheel in the instant in
+    /// which it is in the torque too, which draws least squares to a smaller inertia. Here it is the one with which the prediction errors
+    /// hold nothing of the guidance torque beside what the arm makes of it: of the remnant there is nothing in that (an instrumental
+    /// variable).
+    pub(super) fn inertia_told(&self, optimum: &Optimum) -> Option<Told> {
+        let mut p = optimum.point.clone();
+        p[T_NMS] = self.signals.t_nms_s;
+        // The derivative by T_h's delay is K_hg times T_h less what the arm has of it.
+        p[K_HG] = p[K_HG].max(LEAST_K_HG);
+        let full = self.all_sums(&p);
+        let free: Vec<usize> = (0..self.size())
+            .filter(|&i| self.is_free(i) && (i >= COUNT || i == K_HG || !self.bounds[i].touches(p[i])))
+            .collect();
+        let inverse = covariance(&full.hessian, &free);
+        let instrument = full.hessian.column(H_LATE);
+        let follow = &inverse * instrument;
+        let with = instrument - &full.hessian * &follow;
+        let by = with[WHEEL];
+        let mean_square = with[H_LATE] / self.row_count().max(1) as f64;
+        let step = (follow.dot(&full.gradient) - full.gradient[H_LATE]) / by;
+        let mut moves = -inverse * (full.gradient + full.hessian.column(WHEEL) * step);
+        moves[WHEEL] = step;
+        let told = Told {
+            moves,
+            variance: with[H_LATE] * self.error_variance(optimum) * self.log.slow_noise() / (by * by),
+            probe_nm: mean_square.sqrt() * p[T_NMS] / p[K_HG],
+            slopes: with / -by,
+        };
+        (step.is_finite() && told.variance.is_finite()).then_some(told)
+    }
+
+    /// What all parameters move by for each second of t_nms, the inertia with them: the more of what the slowest and the quickest arm
+    /// make, for that is no straight line.
+    pub(super) fn moves_by_arm(&self, optimum: &Optimum, told: &Told) -> Option<DVector<f64>> {
+        let [quick, slow] = T_NMS_RANGE_S.map(|t_nms| {
+            let (mut other, mut p) = (self.clone(), optimum.point.clone());
+            let by = t_nms - p[T_NMS];
+            p[T_NMS] = t_nms;
+            other.assume_muscle(&p);
+            Some((other.inertia_told(optimum)?.moves - &told.moves) / by)
+        });
+        let mut moves = slow?.zip_map(&quick?, |a, b| if a.abs() > b.abs() { a } else { b });
+        // The probe tells the product of K_hg and the arm's answer: what an unknown arm makes of K_hg reaches farther above than below.
+        let k_hg = optimum.point[K_HG].max(LEAST_K_HG);
+        let share = STANDARD_NORMAL_95 * T_NMS_SD_S * moves[K_HG].abs() / k_hg;
+        moves[K_HG] *= (share.exp_m1() / share).max(1.0);
+        Some(moves)
+    }
+
+    /// The inertia of a wheel that is sought: none that the disturbance hides, or that rests on a bound.
+    pub(super) fn inertia(&self, p: &[f64], told: Option<&Told>) -> Parameter {
+        let [low, high] = SOUGHT_KG_M2;
+        let bounds = Bounds::new(low, high);
+        let of = |told: &Told, variance| {
+            Parameter::estimated(
+                p[WHEEL],
+                0.0,
+                variance,
+                told.moves[WHEEL],
+                bounds,
+                VARIATION_WIDTHS[WHEEL],
+            )
+        };
+        let told = told.filter(|told| {
+            let shakes = told.probe_nm > LEAST_PROBE_NM && of(told, told.variance).identified;
+            shakes && !bounds.touches(p[WHEEL])
+        });
+        told.map_or(Parameter::not_identified(p[WHEEL], bounds), |told| {
+            let known = self.assumed.iter().filter(|a| !self.is_free(a.place));
+            let of_assumed: f64 = known.map(|a| (told.slopes[a.place] * a.sd).powi(2)).sum();
+            of(told, told.variance + of_assumed)
+        })
     }
 }
 

@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::Alternative;
+use super::evidence::{Alternative, LEAST_PROBE_NM, Told};
 use super::sums::Rows;
 use super::uncertainty::{Doubts, TRIMMED_AT_MOST};
 use super::{
@@ -16,7 +16,7 @@ use crate::identify::balance::Balance;
 use crate::identify::change::{BLIP_S, Change, Power, SWING_S, Shape};
 use crate::identify::diagnostics;
 use crate::identify::motion::of_motion;
-use crate::identify::options::Options;
+use crate::identify::options::{Inertia, Options};
 use crate::identify::result::{
     AtTNms, Identification, Parameter, Parameters, Refutation, STANDARD_NORMAL_95,
 };
@@ -175,6 +175,8 @@ impl Problem<'_> {
                     .to_owned(),
             );
         }
+        let unweighed = unweighed(found, doubts.told);
+        found.notes.extend(unweighed);
         found.notes.extend(hidden_gain_2(&mut found.parameters.gain_2));
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
@@ -365,7 +367,8 @@ impl Problem<'_> {
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
         let all = self.alternatives(p, &free, variance * self.log.slow_noise());
         all.into_iter()
-            .filter(|a| [K_NMS, T_NMS].contains(&a.place))
+            // Beside a wheel's inertia neither is told.
+            .filter(|a| !self.is_weighed && [K_NMS, T_NMS].contains(&a.place))
             .filter(|a| self.assumed.iter().any(|known| known.place == a.place))
             .filter(|a| a.z.abs() > DRAWN && self.matters(a, p, &errors))
             .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))
@@ -550,21 +553,59 @@ fn friction(balance: &Balance) -> Option<String> {
     ))
 }
 
+/// Why an inertia that is sought is not identified. One without an interval leaves no driver either.
+fn unweighed(found: &mut Identification, told: Option<&Told>) -> Option<String> {
+    let is_refuted = !found.refuted.is_empty();
+    let sought = found.beyond.iter_mut().find(|b| b.0 == "wheel_inertia");
+    let wheel = sought
+        .map(|b| &mut b.1)
+        .filter(|wheel| !wheel.identified || is_refuted)?;
+    let hidden = wheel.interval_95.is_some();
+    if is_refuted {
+        *wheel = Parameter::not_identified(wheel.optimum?, Bounds::FREE);
+    } else if !hidden {
+        found.parameters.disown();
+    }
+    let why = match found.balance.as_ref().and_then(|b| b.friction_nm) {
+        _ if told.is_none_or(|told| told.probe_nm < LEAST_PROBE_NM) => {
+            "no probe: guidance_torque_nm holds nothing but what the driver's own inputs make too".to_owned()
+        }
+        Some([friction, _]) => {
+            format!("the column's friction of {friction:.2} N.m holds the wheel against the probe")
+        }
+        None if is_refuted => return None,
+        None if hidden => "what is not known of the arm hides it (--fix t_nms)".to_owned(),
+        None if wheel.on_bound => {
+            "it rests on a bound of 0.005 to 0.1 kg.m2: driver_torque_nm may be the hands' own".to_owned()
+        }
+        None => "the drive is too short, or its signals are too coarse".to_owned(),
+    };
+    Some(format!(
+        "wheel_inertia is not identified: {why}. --wheel-inertia J tells it."
+    ))
+}
+
 /// What the torque of the hands was made of.
 fn of_wheel(inertia: f64, options: &Options) -> String {
-    let of = |is_known, leeway: String| {
-        if is_known {
-            String::new()
-        } else {
-            format!(" (give or take {leeway})")
-        }
+    const FALSE: &str =
+        "with an inertia that is much too small k_hg is false, and nothing in the log shows it";
+    let (leeway, beside) = match options.wheel_inertia_is {
+        Inertia::About => (format!(" (give or take {} %)", 100.0 * WHEEL_SHARE), FALSE),
+        Inertia::Exact => (String::new(), FALSE),
+        Inertia::Sought => (
+            " (estimated)".to_owned(),
+            "what the inertia may err by is in the errors of the others",
+        ),
     };
     let damping = options.wheel_damping();
+    let about = match options.wheel_damping {
+        Some(_) => String::new(),
+        None => format!(" (give or take {damping})"),
+    };
     format!(
-        "driver_torque_nm is that of a torsion bar below a wheel without friction, of {inertia} kg.m2{} and {damping} N.m.s/rad{}; {}. The torque of the \
-         hands was made of these; with an inertia that is much too small k_hg is false, and nothing in the log shows it",
-        of(options.wheel_inertia_known, format!("{} %", 100.0 * WHEEL_SHARE)),
-        of(options.wheel_damping.is_some(), damping.to_string()),
+        "driver_torque_nm is that of a torsion bar below a wheel without friction, of {} kg.m2{leeway} and {damping} N.m.s/rad{about}; {}. The torque of the \
+         hands was made of these; {beside}",
+        (1e4 * inertia).round() / 1e4,
         match options.bar_stiffness {
             Some(stiffness) =>
                 format!("wheel_angle_rad is that of the column below a bar of {stiffness} N.m/rad"),

@@ -43,7 +43,7 @@ use std::ops::Range;
 use delays::{Delays, Line};
 pub use information::{INFORMED, Information, Truth, information};
 
-use super::options::Options;
+use super::options::{Inertia, Options};
 use super::prepare::{Prepared, prepare};
 use super::result::{Identification, SAME_LINE, Start};
 use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
@@ -113,7 +113,7 @@ const VARIATION_WIDTHS: [f64; COUNT] = [
     0.2,
     0.1,
     0.1,
-    0.04,
+    SOUGHT_KG_M2[1] - SOUGHT_KG_M2[0],
     0.05,
 ];
 
@@ -146,6 +146,11 @@ const T_NMS_SD_S: f64 = 0.03;
 const K_NMS_SD: f64 = 0.25;
 /// The standard deviation of a wheel's inertia about what the caller says, as a share: a wheel is seldom weighed.
 pub(super) const WHEEL_SHARE: f64 = 0.1;
+/// Where a wheel's inertia is sought, kg.m2: what steering wheels have.
+pub(crate) const SOUGHT_KG_M2: [f64; 2] = [0.005, 0.1];
+/// Most times that it is, and the share of its standard error at which it is found.
+const MOST_WEIGHED: usize = 8;
+const WEIGHED: f64 = 0.05;
 /// Where both are searched once they are freed, N.m/rad and s.
 const K_NMS_SEARCHED: [f64; 2] = [0.0, 4.0];
 const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
@@ -162,7 +167,34 @@ const SMALLEST_ERROR_NM: f64 = 1e-5;
 
 /// Identifies the driver of `log`.
 pub fn identify(log: &DriveLog, options: &Options) -> Identification {
-    identify_prepared(&prepare(log, options), options)
+    let (prepared, options) = weighed(options, |options| prepare(log, options));
+    identify_prepared(&prepared, &options)
+}
+
+/// A drive as `prepared` with the inertia of the wheel that it tells, and the options with that inertia in them; where none is sought,
+/// both as they are.
+pub(crate) fn weighed(options: &Options, prepared: impl Fn(&Options) -> Prepared) -> (Prepared, Options) {
+    let mut options = options.clone();
+    let mut found = prepared(&options);
+    for _ in 0..MOST_WEIGHED {
+        let mut problem = Problem::new(&found, &options);
+        if !problem.is_weighed {
+            break;
+        }
+        let (optimum, _) = problem.search();
+        problem.assume_muscle(&optimum.point);
+        let Some(told) = problem.inertia_told(&optimum) else {
+            break;
+        };
+        let inertia = optimum.point[WHEEL];
+        let next = (inertia + told.moves[WHEEL]).clamp(SOUGHT_KG_M2[0], SOUGHT_KG_M2[1]);
+        if (next - inertia).abs() < WEIGHED * told.variance.sqrt() {
+            break;
+        }
+        options.wheel_inertia = Some(next);
+        found = prepared(&options);
+    }
+    (found, options)
 }
 
 /// Identifies the driver of a log that was prepared.
@@ -195,6 +227,7 @@ struct Assumed {
     sd: f64,
 }
 
+#[derive(Clone)]
 struct Problem<'a> {
     log: &'a DriveLog,
     muscle: Muscle,
@@ -205,6 +238,8 @@ struct Problem<'a> {
     /// The motion of the wheel above a torsion bar, where there is one.
     wheel: Option<&'a WheelMotion>,
     bounds: Vec<Bounds>,
+    /// Whether its inertia is sought.
+    is_weighed: bool,
     /// Rows that the loss is taken over.
     stretches: Vec<Range<usize>>,
     /// Whether anything beyond [`CORE`] is searched.
@@ -254,7 +289,9 @@ impl<'a> Problem<'a> {
         let mut bounds = vec![Bounds::FREE; COUNT + stretches.len()];
         // A driver who steers away from the target line is none.
         bounds[..3].fill(Bounds::new(0.0, f64::INFINITY));
-        bounds[K_HG] = Bounds::new(0.0, 1.0);
+        let is_weighed = options.wheel_inertia_is == Inertia::Sought;
+        // Beside an inertia that is sought, a quicker arm than the one assumed looks like more than 1.
+        bounds[K_HG] = Bounds::new(0.0, if is_weighed { 2.0 } else { 1.0 });
         bounds[T_P] = Bounds::new(0.0, LONGEST_DELAY_S);
         bounds[RHO] = Bounds::new(0.0, 0.999_99);
         bounds[THETA] = Bounds::new(0.0, 0.99);
@@ -286,21 +323,13 @@ impl<'a> Problem<'a> {
         // Anywhere in a row: its standard deviation is that over the root of twelve.
         let of_row_s = log.dt_s / 12.0_f64.sqrt();
         let [offset, bend] = options.line.map(|l| l.is_none());
+        let is_about = inertia > 0.0 && options.wheel_inertia_is == Inertia::About;
+        let is_undamped = inertia > 0.0 && options.wheel_damping.is_none();
         let assumed = [
             (!options.k_nms_known, K_NMS, muscle.k_nms, K_NMS_SD),
             (!options.t_nms_known, T_NMS, muscle.t_nms_s, T_NMS_SD_S),
-            (
-                inertia > 0.0 && !options.wheel_inertia_known,
-                WHEEL,
-                inertia,
-                WHEEL_SHARE * inertia,
-            ),
-            (
-                inertia > 0.0 && options.wheel_damping.is_none(),
-                DAMPING,
-                damping,
-                damping,
-            ),
+            (is_about, WHEEL, inertia, WHEEL_SHARE * inertia),
+            (is_undamped, DAMPING, damping, damping),
             (
                 untimed && options.estimate[2].is_none(),
                 H_LATE,
@@ -319,6 +348,7 @@ impl<'a> Problem<'a> {
                 .collect(),
             signals,
             wheel: prepared.wheel.as_ref(),
+            is_weighed,
             bounds,
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],

@@ -156,9 +156,12 @@ impl Problem<'_> {
             .into_iter()
             .filter(|&i| self.is_free(i))
             .filter_map(|i| Some((NAMES[i]?, parameter(i))));
+        let wheel = self
+            .is_weighed
+            .then(|| ("wheel_inertia", self.inertia(p, found.told.as_ref())));
         Named {
             parameters,
-            beyond: beyond.collect(),
+            beyond: beyond.chain(wheel).collect(),
             line: OwnLine {
                 offset: self
                     .own_line(OWN_OFFSET, found)

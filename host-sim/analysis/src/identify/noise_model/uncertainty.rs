@@ -3,9 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::delays::Line;
-use super::evidence::Alternative;
+use super::evidence::{Alternative, Told};
 use super::sums::Rows;
-use super::{COUNT, DRIVER, K_HG, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS};
+use super::{
+    COUNT, DRIVER, K_HG, K_NMS, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS, WHEEL,
+};
 use crate::identify::change::Constancy;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::AtTNms;
@@ -38,6 +40,8 @@ pub(super) struct Uncertainty {
     pub(super) drawn: DVector<f64>,
     /// The intervals if all is as assumed, if that is not known.
     pub(super) at_t_nms: Option<AtTNms>,
+    /// What is known of a wheel's inertia that is sought.
+    pub(super) told: Option<Told>,
 }
 
 /// What the verdict is made of beside the results.
@@ -45,6 +49,7 @@ pub(super) struct Doubts<'a> {
     pub(super) alternatives: &'a [Alternative],
     pub(super) errors: &'a DMatrix<f64>,
     pub(super) active: &'a ActiveBounds,
+    pub(super) told: Option<&'a Told>,
 }
 
 impl Uncertainty {
@@ -53,6 +58,7 @@ impl Uncertainty {
             alternatives: &self.alternatives,
             errors: &self.errors,
             active: &self.active,
+            told: self.told.as_ref(),
         }
     }
 }
@@ -107,7 +113,7 @@ impl Problem<'_> {
         let core: Vec<usize> = free
             .iter()
             .copied()
-            .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
+            .filter(|&i| i >= COUNT || i == K_HG && self.is_weighed || !self.bounds[i].touches(p[i]))
             .collect();
         let doubted = self.doubted(&prepared.lane_doubts, p, &kept, &inverse);
         let slow_variance = error_variance * self.log.slow_noise();
@@ -127,6 +133,11 @@ impl Problem<'_> {
         let active = self.active_bounds(optimum, &free, &errors, error_variance);
         errors += doubted.covariance(self.size());
         let constancy = self.constancy(p, error_variance, manual, &mut errors);
+        let mut told = self.is_weighed.then(|| self.inertia_told(optimum)).flatten();
+        if let Some(told) = &mut told {
+            let by_arm = self.moves_by_arm(optimum, told);
+            with_inertia(told, by_arm, &mut errors, &mut alternatives);
+        }
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
         if self.assumed.iter().any(|a| !self.is_free(a.place)) {
             at_t_nms = Some(self.as_assumed(&unbiased, &errors, &active.pull));
@@ -143,6 +154,7 @@ impl Problem<'_> {
             constancy,
             drawn,
             at_t_nms,
+            told,
         };
         (found, kept)
     }
@@ -203,6 +215,31 @@ impl Problem<'_> {
                 .collect(),
             contradicted,
             pull,
+        }
+    }
+}
+
+/// Widens the errors by what the disturbance makes of a wheel's inertia, and lets the inertia follow what else is assumed: of the arm the
+/// record then says nothing.
+fn with_inertia(
+    told: &mut Told,
+    by_arm: Option<DVector<f64>>,
+    errors: &mut DMatrix<f64>,
+    alternatives: &mut [Alternative],
+) {
+    let by_inertia = alternatives.iter().find(|a| a.place == WHEEL);
+    let Some(by_inertia) = by_inertia.map(|a| a.slopes.clone()) else {
+        return;
+    };
+    *errors += told.variance * &by_inertia * by_inertia.transpose();
+    for a in alternatives.iter_mut().filter(|a| a.place != WHEEL) {
+        a.slopes += told.slopes[a.place] * &by_inertia;
+        if [K_NMS, T_NMS].contains(&a.place) {
+            a.error = f64::INFINITY;
+        }
+        if let Some(by_arm) = by_arm.as_ref().filter(|_| a.place == T_NMS) {
+            told.slopes[T_NMS] = by_arm[WHEEL];
+            a.slopes.clone_from(by_arm);
         }
     }
 }
