@@ -27,7 +27,7 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("host-sim/campaign", 4_150),
     ("host-sim/column", 1_630),
     ("host-sim/engine", 1_280),
-    ("host-sim/evidence", 7_620),
+    ("host-sim/evidence", 7_730),
     ("host-sim/input", 370),
     ("host-sim/log", 5_810),
     ("host-sim/metrics", 550),

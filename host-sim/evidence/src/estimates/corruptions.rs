@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
+use super::recordings::Weighed;
 use super::repetitions::bound_of;
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, each};
@@ -104,6 +105,9 @@ pub struct Corruptions {
     /// Intervals of the drivers whose t_nms is what is assumed. Intervals hold arms of all kinds 95 times in 100, those
     /// at the edge of the range of arms less often.
     pub intervals_at_t_nms: [Held; COMPARED],
+    /// What was made of wheels above a torsion bar whose inertia was sought; none of corrupted logs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wheels: Vec<Weighed>,
     /// Least RMS errors of an unbiased estimator from the clean logs, in the order of the lines' own.
     pub bound: [f64; COMPARED],
     /// What was promised and is not kept.
@@ -316,6 +320,7 @@ impl Corruptions {
             false_identifications,
             intervals,
             intervals_at_t_nms,
+            wheels: Vec::new(),
             bound,
             broken,
         }

@@ -8,14 +8,16 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
 use haptic_analysis::identify::{
-    Identification, Layout, LogError, Options, Recording, Traces, identify_with_noise_model, of_bytes,
+    Identification, Layout, Options, Recording, Traces, identify_with_noise_model, of_bytes,
 };
 use haptic_log::formats::Format;
 use haptic_log::trace::Trace;
+use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::torsion_bar::{ColumnKind, ColumnParameters};
+use haptic_sim::participants::PublishedDriver;
 use haptic_sim::simulation;
-use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
 use super::corruptions::{CorruptionLine, Corruptions, Held};
@@ -24,6 +26,8 @@ use haptic_batch::engine::{Watch, each};
 use haptic_batch::experiment::ExperimentPlan;
 use haptic_batch::experiment::{COMPARED, Compared, compared};
 use haptic_batch::experiment::{guided, scenario_of_drive};
+use haptic_batch::statistics::{mean, rms};
+use serde::Serialize;
 
 /// How a drive is recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +45,10 @@ pub struct Channel {
     pub plant_friction_nm: Option<f64>,
     /// What `identify` is told of it as `--wheel-inertia`, kg.m2.
     pub told_kg_m2: Option<f64>,
+    /// Whether it is to estimate the inertia instead.
+    pub is_sought: bool,
+    /// Whether each driver's arm is drawn: t_nms of 0.06 to 0.15 s, K_nms of 0.5 to 1.5 N.m/rad.
+    pub other_arm: bool,
     /// Standard deviation of each lane line, m.
     pub line_noise_m: f64,
 }
@@ -52,6 +60,8 @@ const ROAD: Channel = Channel {
     wheel_kg_m2: 0.04,
     plant_friction_nm: None,
     told_kg_m2: None,
+    is_sought: false,
+    other_arm: false,
     line_noise_m: 0.02,
 };
 const LONG: Channel = Channel {
@@ -70,6 +80,14 @@ const fn told(inertia_kg_m2: f64) -> Channel {
     }
 }
 
+const fn sought(wheel_kg_m2: f64) -> Channel {
+    Channel {
+        wheel_kg_m2,
+        is_sought: true,
+        ..told(wheel_kg_m2)
+    }
+}
+
 const fn plant(friction_nm: f64) -> Channel {
     Channel {
         wheel_kg_m2: 0.044,
@@ -79,7 +97,7 @@ const fn plant(friction_nm: f64) -> Channel {
 }
 
 /// The channels, with what each is.
-pub const CHANNELS: [(&str, Channel); 17] = [
+pub const CHANNELS: [(&str, Channel); 22] = [
     ("10 Hz, 60 s, no probe, torsion bar", ROAD),
     ("10 Hz, 130 s, no probe, torsion bar", LONG),
     ("10 Hz, 60 s, probe, torsion bar", Channel { probe: true, ..ROAD }),
@@ -132,11 +150,73 @@ pub const CHANNELS: [(&str, Channel); 17] = [
         "100 Hz, 130 s, probe, the simulator's bar, its wheel told, with 0.1 N.m of friction",
         plant(0.1),
     ),
+    (
+        "100 Hz, 130 s, probe, torsion bar, its wheel of 0.02 kg.m2 sought",
+        sought(0.02),
+    ),
+    (
+        "100 Hz, 130 s, probe, torsion bar, its wheel of 0.06 kg.m2 sought",
+        sought(0.06),
+    ),
+    (
+        "100 Hz, 130 s, probe, torsion bar, its wheel sought, other arms",
+        Channel {
+            other_arm: true,
+            ..sought(0.04)
+        },
+    ),
+    (
+        "100 Hz, 130 s, no probe, torsion bar, its wheel sought",
+        Channel {
+            probe: false,
+            ..sought(0.04)
+        },
+    ),
+    (
+        "100 Hz, 130 s, probe, the simulator's bar, its wheel sought",
+        Channel {
+            is_sought: true,
+            ..plant(0.0)
+        },
+    ),
 ];
+
+/// What was made of the inertia of a wheel that was sought.
+#[derive(Debug, Clone, Serialize)]
+pub struct Weighed {
+    /// How the drives were recorded.
+    pub recorded: &'static str,
+    /// Drives whose inertia was identified, and how many of their 95 % intervals hold it.
+    pub intervals: Held,
+    /// Root mean square of their errors, kg.m2.
+    pub rms: Option<f64>,
+    /// Mean of their standard errors, kg.m2.
+    pub standard_error: Option<f64>,
+}
+
+impl Weighed {
+    fn new(recorded: &'static str, truth: f64, fits: &[([Compared; COMPARED], Identification)]) -> Self {
+        let sought = fits.iter().flat_map(|(_, fit)| &fit.beyond);
+        let found: Vec<Compared> = sought
+            .filter(|(name, wheel)| *name == "wheel_inertia" && wheel.identified)
+            .map(|&(name, wheel)| (name, wheel, truth))
+            .collect();
+        let errors = found
+            .iter()
+            .filter_map(|(_, wheel, _)| Some(wheel.estimate? - truth));
+        Self {
+            recorded,
+            intervals: Held::new(found.iter()),
+            rms: rms(errors),
+            standard_error: mean(found.iter().filter_map(|(_, wheel, _)| wheel.standard_error)),
+        }
+    }
+}
 
 /// Records the guided drives of `plan` with `seeds` seeds from its own on by each of [`CHANNELS`], and identifies each as `identify
 /// --layout openlka` does. The corruptions of the result are the channels; no
-/// information bound is given for them. What is promised is promised of those whose wheel is told rightly or not at all.
+/// information bound is given for them. What is promised is promised of those whose wheel is told rightly or not at all;
+/// of those whose wheel is sought it is that none is false.
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a recording that the layout refuses.
@@ -144,28 +224,9 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
     let layout = Layout::named("openlka")?;
     let jobs = guided(plan, seeds)?;
     let found = each(&jobs, watch, |&(number, truth, seed)| {
-        let drive = |channel: &Channel| {
-            let probe_nm = if channel.probe { plan.probe_nm } else { 0.0 };
-            let plan = ExperimentPlan {
-                seed: plan.seed.wrapping_add(seed),
-                probe_nm,
-                ..plan.clone()
-            };
-            let mut scenario = scenario_of_drive(&plan, number, &truth, truth.parameters())?;
-            if let Some(upper_friction_nm) = channel.plant_friction_nm {
-                let column = ColumnParameters {
-                    kind: ColumnKind::TorsionBar,
-                    j_w_kg_m2: channel.wheel_kg_m2,
-                    upper_friction_nm,
-                    lower_friction_nm: 0.3,
-                    ..ColumnParameters::default()
-                };
-                let guidance = scenario.guidance().told_of(&column);
-                scenario = scenario.to_builder().column(column).guidance(guidance).build()?;
-            }
-            Ok::<_, StudyError>(simulation::simulate(&scenario).trace)
-        };
-        let of_rigid = [drive(&ROAD)?, drive(&PROBED)?];
+        let usual = truth.parameters();
+        let drive = |channel: &Channel, driver| channel.driven(plan, (number, &truth, seed), driver);
+        let of_rigid = [drive(&ROAD, usual)?, drive(&PROBED, usual)?];
         let mut random = Xoshiro256PlusPlus::seed_from_u64(
             plan.seed
                 .wrapping_add(seed)
@@ -173,29 +234,48 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
                 .wrapping_add(u64::from(number)),
         );
         let fit = |(_, channel): &(&str, Channel)| {
-            let bytes = match channel.plant_friction_nm {
-                None => channel.record(&of_rigid[usize::from(channel.probe)], &mut random),
-                Some(_) => channel.record(&drive(channel)?, &mut random),
+            let mut driver = usual;
+            if channel.other_arm {
+                driver.t_nms = random.random_range(0.06..0.15);
+                driver.k_nms = random.random_range(0.5..1.5);
+            }
+            let bytes = if channel.other_arm || channel.plant_friction_nm.is_some() {
+                channel.record(&drive(channel, driver)?, &mut random)
+            } else {
+                channel.record(&of_rigid[usize::from(channel.probe)], &mut random)
             };
-            let fit = identified(bytes, &layout, channel.told_kg_m2)?;
+            let fit = identified(bytes, &layout, channel)?;
             Ok((compared(&truth, &fit.parameters), fit))
         };
         CHANNELS.iter().map(fit).collect::<Result<Vec<_>, StudyError>>()
     })?;
-    let lines = CHANNELS.iter().enumerate().map(|(k, (name, _))| {
+    let mut wheels = Vec::new();
+    let lines = CHANNELS.iter().enumerate().map(|(k, (name, channel))| {
         let fits: Vec<([Compared; COMPARED], Identification)> =
             found.iter().map(|each| each[k].clone()).collect();
+        if channel.is_sought {
+            wheels.push(Weighed::new(name, channel.wheel_kg_m2, &fits));
+        }
         CorruptionLine::new(name, &fits)
     });
-    let is_judged =
-        |(_, channel): &(&str, Channel)| channel.told_kg_m2.is_none_or(|told| told == channel.wheel_kg_m2);
-    let (judged, told_wrongly) = lines
+    let is_judged = |(_, channel): &(&str, Channel)| {
+        !channel.is_sought && channel.told_kg_m2.is_none_or(|told| told == channel.wheel_kg_m2)
+    };
+    let (judged, others) = lines
         .zip(&CHANNELS)
         .partition::<Vec<_>, _>(|(_, channel)| is_judged(channel));
-    let only_lines = |pairs: Vec<(CorruptionLine, _)>| pairs.into_iter().map(|(line, _)| line);
-    let judged = only_lines(judged).collect();
+    let judged = judged.into_iter().map(|(line, _)| line).collect();
     let mut found = Corruptions::new(plan, seeds, judged, [f64::NAN; COMPARED]);
-    found.lines.extend(only_lines(told_wrongly));
+    for (line, (_, channel)) in others {
+        if channel.is_sought && line.false_identifications > 0 {
+            let (count, name) = (line.false_identifications, line.corrupted_by);
+            found
+                .broken
+                .push(format!("{count} false identifications, none is wanted: {name}"));
+        }
+        found.lines.push(line);
+    }
+    found.wheels = wheels;
     let all = found
         .intervals
         .iter()
@@ -212,23 +292,47 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
     Ok(found)
 }
 
-fn identified(
-    bytes: Vec<u8>,
-    layout: &Layout,
-    wheel_inertia: Option<f64>,
-) -> Result<Identification, LogError> {
+fn identified(bytes: Vec<u8>, layout: &Layout, channel: &Channel) -> Result<Identification, StudyError> {
     let how = Recording::default();
     let (log, _) = of_bytes(bytes, Some(Format::Csv), Some(layout), &[], &how)?;
-    let options = Options {
-        wheel_inertia,
-        ..Options::default()
-    };
+    let mut options = Options::default();
+    if channel.is_sought {
+        options.weigh("estimate")?;
+    } else {
+        options.wheel_inertia = channel.told_kg_m2;
+    }
     let mut fit = identify_with_noise_model(&log, &options);
     fit.traces = Traces::default();
     Ok(fit)
 }
 
 impl Channel {
+    /// A guided drive of a participant as this driver, in the car that the channel records.
+    fn driven(
+        &self,
+        plan: &ExperimentPlan,
+        (number, truth, seed): (u32, &PublishedDriver, u64),
+        driver: DriverParameters,
+    ) -> Result<Trace, StudyError> {
+        let plan = ExperimentPlan {
+            probe_nm: if self.probe { plan.probe_nm } else { 0.0 },
+            ..plan.repetition(seed)
+        };
+        let mut scenario = scenario_of_drive(&plan, number, truth, driver)?;
+        if let Some(upper_friction_nm) = self.plant_friction_nm {
+            let column = ColumnParameters {
+                kind: ColumnKind::TorsionBar,
+                j_w_kg_m2: self.wheel_kg_m2,
+                upper_friction_nm,
+                lower_friction_nm: 0.3,
+                ..ColumnParameters::default()
+            };
+            let guidance = scenario.guidance().told_of(&column);
+            scenario = scenario.to_builder().column(column).guidance(guidance).build()?;
+        }
+        Ok(simulation::simulate(&scenario).trace)
+    }
+
     /// A drive as this car writes it, with openpilot's names and signs.
     fn record(&self, drive: &Trace, random: &mut Xoshiro256PlusPlus) -> Vec<u8> {
         let mut text = String::from(

@@ -6,7 +6,7 @@ use super::{changes, random};
 use haptic_batch::experiment::ExperimentPlan;
 use haptic_evidence::estimates::{
     Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, RandomDrives, Repeated,
-    Repetitions,
+    Repetitions, Weighed,
 };
 use haptic_evidence::vehicle::VehicleCoverage;
 use haptic_report::document::{Block, Cell, Report, Section, Table};
@@ -83,8 +83,8 @@ impl Validation {
             Self::Random(r) => random::summary(r),
             Self::Recordings(r) => format!(
                 "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
-                 between it and the hands; each lane line has noise of 2 cm where nothing else is said. A wheel that is told wrongly \
-                 is in the table and not in these sums.",
+                 between it and the hands; each lane line has noise of 2 cm where nothing else is said. A wheel that is told wrongly or \
+                 sought is in the table and not in these sums.",
                 of_plan(r.seeds, &r.plan),
                 r.false_identifications,
                 r.identified,
@@ -96,8 +96,13 @@ impl Validation {
     fn tables(&self) -> Vec<Table> {
         match self {
             Self::Coverage(result) => vec![repetitions_table(result)],
-            Self::Corruptions(result) | Self::Recordings(result) => {
-                vec![corruptions_table(result), held_table(result)]
+            Self::Corruptions(result) => vec![corruptions_table(result), held_table(result)],
+            Self::Recordings(result) => {
+                vec![
+                    corruptions_table(result),
+                    held_table(result),
+                    wheels_table(result),
+                ]
             }
             Self::Changes(result) => vec![changes::table(result)],
             Self::Methods(result) => vec![methods_table(&result.lines)],
@@ -287,6 +292,23 @@ fn held_table(result: &Corruptions) -> Table {
         "Share of the 95 % intervals of identified values that hold the truth. Corruptions with which nothing is identified are \
          left out.",
         lines.map(|l| row(l.corrupted_by, &l.intervals)).chain(all),
+    )
+}
+
+/// What was made of wheels whose inertia was sought.
+fn wheels_table(result: &Corruptions) -> Table {
+    let row = |w: &Weighed| {
+        [
+            ("Recorded by", Cell::text(w.recorded)),
+            ("Identified", Cell::count(w.intervals.identified)),
+            ("Coverage of 95 %", Cell::number(w.intervals.share(), 3)),
+            ("RMS error (kg.m2)", Cell::number(w.rms, 4)),
+            ("Standard error", Cell::number(w.standard_error, 4)),
+        ]
+    };
+    Table::of_rows(
+        "The wheel's inertia, where it was sought.",
+        result.wheels.iter().map(row),
     )
 }
 
