@@ -20,13 +20,25 @@ type Arrows = &'static [(&'static str, &'static [&'static str])];
 const CORE: Arrows = &[
     // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
     ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
-    ("controller", &["controller::config", "controller::injection", "controller::inputs", "quantity", "safety::envelope", "safety::faults", "safety::modes", "safety::redundant"]),
+    (
+        "controller",
+        &["controller::config", "controller::injection", "controller::inputs", "observer", "quantity", "safety::envelope", "safety::faults", "safety::modes", "safety::redundant"],
+    ),
     ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "observer", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("controller::injection", &["quantity"]),
     ("controller::inputs", &["lane", "quantity", "safety::faults", "safety::redundant"]),
-    ("controller::memory", &["law", "law::activity", "law::probe", "observer", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
-    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "controller::memory", "lane", "law", "law::activity", "law::probe", "observer", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::plausibility", "safety::ramp"]),
-    ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "lane", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    (
+        "controller::memory",
+        &["law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"],
+    ),
+    (
+        "controller::step",
+        &["controller", "controller::config", "controller::injection", "controller::inputs", "controller::memory", "lane", "law", "law::activity", "law::probe", "observer", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::plausibility", "safety::ramp", "safety::redundant"],
+    ),
+    (
+        "ecu",
+        &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "lane", "observer", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"],
+    ),
     ("estimator", &["bus", "law::sine", "quantity"]),
     // The input that bus, law and checks share.
     ("lane", &["quantity", "safety::redundant"]),
