@@ -123,7 +123,7 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
         .map(|_| [torque(|s| s.driver_torque_nm), torque(|s| s.guidance_torque_nm)]);
     let mut times_to_crossing_s = Vec::new();
     let mut are_finite = true;
-    // One pass, as a long trace is read from memory each time.
+    // A long trace does not fit into a cache: one pass reads it once.
     for (place, sample) in range.clone().zip(samples) {
         are_finite &= is_finite(sample);
         let speed = speed_m_s(sample, circumstances);
