@@ -131,7 +131,7 @@ fn above_a_bar(mut log: DriveLog, inertia: f64) -> DriveLog {
 fn sought(log: &DriveLog, fixes: &[&str]) -> (Parameter, Identification) {
     let fixes: Vec<String> = fixes.iter().map(ToString::to_string).collect();
     let mut options = Options::given(false, &fixes).unwrap();
-    options.weigh("estimate").unwrap();
+    options.take_inertia("estimate").unwrap();
     let found = identify_with_noise_model(log, &options);
     let (name, wheel) = *found.beyond.last().unwrap();
     assert_eq!(name, "wheel_inertia");

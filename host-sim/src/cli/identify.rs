@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
     /// The torque was measured by a torsion bar below a steering wheel of this inertia, 0.001 to 0.2: the torque of the hands is made of it
-    /// before the fit, from 40 rows a second or more. Weigh the wheel: it counts as known to 10 % (--fix wheel_inertia=J: exactly), and one that
+    /// before the fit, from 40 rows a second or more. It counts as known to 10 % (--fix wheel_inertia=J: exactly), and one that
     /// is much too small makes k_hg false. "estimate" takes the one that the drive's probe tells, of 0.005 to 0.1, with its interval. Without it
     /// driver_torque_nm is taken as the torque of the hands
     #[arg(long, value_name = "KG_M2|estimate")]
@@ -61,7 +61,7 @@ enum MethodArgument {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let mut options = arguments.fit.options(&arguments.recording.reading)?;
     if let Some(inertia) = &arguments.wheel_inertia {
-        options.weigh(inertia)?;
+        options.take_inertia(inertia)?;
     }
     options.lane_noise = !arguments.no_lane_smoothing;
     options.leave_out = !arguments.no_preprocessing;

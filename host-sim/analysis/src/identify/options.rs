@@ -37,7 +37,7 @@ pub struct Options {
     pub line: [Option<f64>; 2],
     /// Inertia of the wheel above a torsion bar that measured T_d, kg.m2; none where T_d is the torque of the hands.
     pub wheel_inertia: Option<f64>,
-    /// How well that is known.
+    /// How well the inertia of the wheel is known.
     pub wheel_inertia_is: Inertia,
     /// Damping of that wheel, N.m.s/rad; none where it is not known, so 0 to 0.05.
     pub wheel_damping: Option<f64>,
@@ -189,8 +189,9 @@ impl Options {
     /// Takes the inertia of a wheel above a torsion bar, kg.m2, or `estimate`.
     ///
     /// # Errors
-    /// Neither, or outside [`WHEEL_INERTIA_KG_M2`]; beside one that is fixed; `estimate` of a drive by hand.
-    pub fn weigh(&mut self, text: &str) -> Result<(), FixError> {
+    /// Neither, or outside [`WHEEL_INERTIA_KG_M2`]; beside one that is fixed; `estimate` of a drive by hand or beside
+    /// a torque that is late.
+    pub fn take_inertia(&mut self, text: &str) -> Result<(), FixError> {
         let [least, most] = WHEEL_INERTIA_KG_M2;
         let is_sought = text == "estimate";
         let told = text.parse().ok().filter(|told| (least..=most).contains(told));
@@ -198,6 +199,8 @@ impl Options {
             "--fix wheel_inertia is given too, one of them is allowed".to_owned()
         } else if is_sought && self.manual {
             "a --manual drive has no guidance torque, which alone tells it".to_owned()
+        } else if is_sought && self.estimate[2..].iter().any(Option::is_some) {
+            "beside --estimate t_h_late or t_d_late the probe tells the one or the other".to_owned()
         } else if !is_sought && told.is_none() {
             format!("{least} to {most} kg.m2 or \"estimate\" is wanted")
         } else {
@@ -408,18 +411,20 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_is_weighed_or_to_be_weighed() {
+    fn a_wheel_has_an_inertia_or_it_is_sought() {
         for (text, inertia, is) in [
             ("0.001", 0.001, Inertia::About),
             ("0.2", 0.2, Inertia::About),
             ("estimate", USUAL_INERTIA_KG_M2, Inertia::Sought),
         ] {
             let mut o = Options::default();
-            o.weigh(text).unwrap();
+            o.take_inertia(text).unwrap();
             assert_eq!((o.wheel_inertia, o.wheel_inertia_is), (Some(inertia), is));
         }
         let [by_hand, fixed] = [(true, None), (false, Some("wheel_inertia=0.04".to_owned()))]
             .map(|(manual, fix)| Options::given(manual, &Vec::from_iter(fix)).unwrap());
+        let mut late = Options::default();
+        late.estimate("t_h_late").unwrap();
         for (mut o, text, says) in [
             (
                 Options::default(),
@@ -430,10 +435,11 @@ mod tests {
             (Options::default(), "NaN", "NaN: 0.001 to 0.2"),
             (Options::default(), "guess", "guess: 0.001 to 0.2"),
             (by_hand, "estimate", "a --manual drive has no guidance torque"),
+            (late, "estimate", "the probe tells the one or the other"),
             (fixed.clone(), "0.04", "--fix wheel_inertia is given too"),
             (fixed, "estimate", "--fix wheel_inertia is given too"),
         ] {
-            let e = o.weigh(text).unwrap_err().to_string();
+            let e = o.take_inertia(text).unwrap_err().to_string();
             assert!(e.starts_with("--wheel-inertia ") && e.contains(says), "{e}");
         }
     }

@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use super::change::{Change, Constancy, SHORTEST_S, Shape};
-use super::noise_model::{identify_prepared, weighed};
+use super::noise_model::{identify_prepared, with_inertia_sought};
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::Identification;
@@ -43,7 +43,7 @@ const MOST: usize = 20;
 
 /// Identifies the driver of each piece of `log`.
 pub fn identify_in_pieces(log: &DriveLog, options: &Options) -> Pieces {
-    let (prepared, options) = weighed(options, |options| prepare(log, options));
+    let (prepared, options) = with_inertia_sought(options, |options| prepare(log, options));
     let whole = Whole { prepared, options };
     let [start_s, end_s] = [log.start_s, log.time_s(log.len())];
     let mut changes = Vec::new();

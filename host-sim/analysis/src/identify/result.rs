@@ -475,7 +475,8 @@ pub struct Identification {
     pub constancy: Option<Constancy>,
     /// The loss over t_p with all else at its best, as minus twice the log likelihood above the optimum.
     pub delay_profile: Vec<[f64; 2]>,
-    /// The line that the driver takes; none for the published method, in which it is the target line.
+    /// The line that the driver takes; none for the published method, in which it is the target line, and where a wheel's inertia is sought
+    /// and not found.
     pub line: Option<OwnLine>,
     /// What is usually taken as known and was estimated: k_nms, t_nms, t_h_late, t_d_late, wheel_inertia.
     pub beyond: Vec<(&'static str, Parameter)>,

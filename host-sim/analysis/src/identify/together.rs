@@ -51,7 +51,7 @@ fn fitted(logs: &[DriveLog], options: &Options) -> Result<(Prepared, Identificat
             1.0 / other.dt_s
         ));
     }
-    let (prepared, options) = noise_model::weighed(options, |options| {
+    let (prepared, options) = noise_model::with_inertia_sought(options, |options| {
         let mut all = prepare(first, options);
         for log in &logs[1..] {
             all.append(prepare(log, options));

@@ -71,7 +71,7 @@ pub fn track(log: &DriveLog, options: &Options) -> Tracking {
 
 /// Identifies the driver of `log` by the noise model, and follows that driver through it.
 pub fn identify_and_track(log: &DriveLog, options: &Options) -> (Identification, Tracking) {
-    let (prepared, options) = noise_model::weighed(options, |options| prepare(log, options));
+    let (prepared, options) = noise_model::with_inertia_sought(options, |options| prepare(log, options));
     let whole = noise_model::identify_prepared(&prepared, &options);
     let tracking = follow(&prepared, &options, &whole);
     (whole, tracking)

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
-use super::recordings::Weighed;
+use super::recordings::SoughtWheel;
 use super::repetitions::bound_of;
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, each};
@@ -107,7 +107,7 @@ pub struct Corruptions {
     pub intervals_at_t_nms: [Held; COMPARED],
     /// What was made of wheels above a torsion bar whose inertia was sought; none of corrupted logs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub wheels: Vec<Weighed>,
+    pub wheels: Vec<SoughtWheel>,
     /// Least RMS errors of an unbiased estimator from the clean logs, in the order of the lines' own.
     pub bound: [f64; COMPARED],
     /// What was promised and is not kept.

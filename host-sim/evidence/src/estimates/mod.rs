@@ -25,5 +25,5 @@ pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
 pub use kinds::{KINDS, Kind};
 pub use methods::{METHODS, MethodLine, Methods, methods};
 pub use random::{ConditionLine, RandomDrive, RandomDrives, RandomPlan, Said, Share, Tally, resumed_random};
-pub use recordings::{CHANNELS, Channel, Weighed, recordings};
+pub use recordings::{CHANNELS, Channel, SoughtWheel, recordings};
 pub use repetitions::{Repeated, Repetitions, repeat};

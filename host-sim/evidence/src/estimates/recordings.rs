@@ -183,7 +183,7 @@ pub const CHANNELS: [(&str, Channel); 22] = [
 
 /// What was made of the inertia of a wheel that was sought.
 #[derive(Debug, Clone, Serialize)]
-pub struct Weighed {
+pub struct SoughtWheel {
     /// How the drives were recorded.
     pub recorded: &'static str,
     /// Drives whose inertia was identified, and how many of their 95 % intervals hold it.
@@ -194,7 +194,7 @@ pub struct Weighed {
     pub standard_error: Option<f64>,
 }
 
-impl Weighed {
+impl SoughtWheel {
     fn new(recorded: &'static str, truth: f64, fits: &[([Compared; COMPARED], Identification)]) -> Self {
         let sought = fits.iter().flat_map(|(_, fit)| &fit.beyond);
         let found: Vec<Compared> = sought
@@ -254,7 +254,7 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
         let fits: Vec<([Compared; COMPARED], Identification)> =
             found.iter().map(|each| each[k].clone()).collect();
         if channel.is_sought {
-            wheels.push(Weighed::new(name, channel.wheel_kg_m2, &fits));
+            wheels.push(SoughtWheel::new(name, channel.wheel_kg_m2, &fits));
         }
         CorruptionLine::new(name, &fits)
     });
@@ -297,7 +297,7 @@ fn identified(bytes: Vec<u8>, layout: &Layout, channel: &Channel) -> Result<Iden
     let (log, _) = of_bytes(bytes, Some(Format::Csv), Some(layout), &[], &how)?;
     let mut options = Options::default();
     if channel.is_sought {
-        options.weigh("estimate")?;
+        options.take_inertia("estimate")?;
     } else {
         options.wheel_inertia = channel.told_kg_m2;
     }

@@ -6,7 +6,7 @@ use super::{changes, random};
 use haptic_batch::experiment::ExperimentPlan;
 use haptic_evidence::estimates::{
     Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, RandomDrives, Repeated,
-    Repetitions, Weighed,
+    Repetitions, SoughtWheel,
 };
 use haptic_evidence::vehicle::VehicleCoverage;
 use haptic_report::document::{Block, Cell, Report, Section, Table};
@@ -297,7 +297,7 @@ fn held_table(result: &Corruptions) -> Table {
 
 /// What was made of wheels whose inertia was sought.
 fn wheels_table(result: &Corruptions) -> Table {
-    let row = |w: &Weighed| {
+    let row = |w: &SoughtWheel| {
         [
             ("Recorded by", Cell::text(w.recorded)),
             ("Identified", Cell::count(w.intervals.identified)),

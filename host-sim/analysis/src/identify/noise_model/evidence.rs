@@ -20,7 +20,7 @@ const BLOCK_S: f64 = 2.0;
 /// K_hg that the derivative by T_h's delay is taken at, at least: it is in proportion to it.
 const LEAST_K_HG: f64 = 0.05;
 
-/// Less than this of a guidance torque is no probe, but may be made of what the remnant did before, N.m.
+/// Less than this of a guidance torque, N.m, is no probe or a weak one: the remnant may have made it through the car and the law.
 pub(super) const LEAST_PROBE_NM: f64 = 0.03;
 
 /// What freeing one assumption would do, to first order.

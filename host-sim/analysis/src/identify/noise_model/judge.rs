@@ -175,12 +175,17 @@ impl Problem<'_> {
                     .to_owned(),
             );
         }
-        let unweighed = unweighed(found, doubts.told);
-        found.notes.extend(unweighed);
+        // The search goes on to 2, so that an inertia that is sought meets no bound there.
+        let k_hg = &mut found.parameters.k_hg;
+        if self.is_inertia_sought && k_hg.estimate.is_some_and(|value| value > 1.0) {
+            (k_hg.identified, k_hg.estimate) = (false, None);
+        }
+        let why = why_not_found(found, doubts.told);
+        found.notes.extend(why);
         found.notes.extend(hidden_gain_2(&mut found.parameters.gain_2));
         found.assumed.extend(self.assumed_of_muscle(p));
         found.assumed.push(match options.wheel_inertia {
-            Some(inertia) => of_wheel(inertia, options),
+            Some(inertia) => of_wheel(inertia, options, found),
             None => "driver_torque_nm is the torque of the hands: no wheel turns between them and the sensor"
                 .to_owned(),
         });
@@ -368,7 +373,7 @@ impl Problem<'_> {
         let all = self.alternatives(p, &free, variance * self.log.slow_noise());
         all.into_iter()
             // Beside a wheel's inertia neither is told.
-            .filter(|a| !self.is_weighed && [K_NMS, T_NMS].contains(&a.place))
+            .filter(|a| !self.is_inertia_sought && [K_NMS, T_NMS].contains(&a.place))
             .filter(|a| self.assumed.iter().any(|known| known.place == a.place))
             .filter(|a| a.z.abs() > DRAWN && self.matters(a, p, &errors))
             .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))
@@ -553,8 +558,8 @@ fn friction(balance: &Balance) -> Option<String> {
     ))
 }
 
-/// Why an inertia that is sought is not identified. One without an interval leaves no driver either.
-fn unweighed(found: &mut Identification, told: Option<&Told>) -> Option<String> {
+/// Why an inertia that is sought is not identified. One without an interval leaves neither a driver nor a line.
+fn why_not_found(found: &mut Identification, told: Option<&Told>) -> Option<String> {
     let is_refuted = !found.refuted.is_empty();
     let sought = found.beyond.iter_mut().find(|b| b.0 == "wheel_inertia");
     let wheel = sought
@@ -564,19 +569,22 @@ fn unweighed(found: &mut Identification, told: Option<&Told>) -> Option<String> 
     if is_refuted {
         *wheel = Parameter::not_identified(wheel.optimum?, Bounds::FREE);
     } else if !hidden {
-        found.parameters.disown();
+        found.parameters.take_back();
+        found.line = None;
     }
+    let probe_nm = told.map_or(0.0, |told| told.probe_nm);
     let why = match found.balance.as_ref().and_then(|b| b.friction_nm) {
-        _ if told.is_none_or(|told| told.probe_nm < LEAST_PROBE_NM) => {
-            "no probe: guidance_torque_nm holds nothing but what the driver's own inputs make too".to_owned()
-        }
+        _ if probe_nm < LEAST_PROBE_NM => format!(
+            "no probe, or one that is too weak: guidance_torque_nm has {probe_nm:.3} N.m beside what the driver's own inputs make, \
+             {LEAST_PROBE_NM} N.m are wanted"
+        ),
         Some([friction, _]) => {
             format!("the column's friction of {friction:.2} N.m holds the wheel against the probe")
         }
         None if is_refuted => return None,
         None if hidden => "what is not known of the arm hides it (--fix t_nms)".to_owned(),
         None if wheel.on_bound => {
-            "it rests on a bound of 0.005 to 0.1 kg.m2: driver_torque_nm may be the hands' own".to_owned()
+            "it rests on a bound of 0.005 to 0.1 kg.m2: driver_torque_nm may be the hands' own, or the wheel is another".to_owned()
         }
         None => "the drive is too short, or its signals are too coarse".to_owned(),
     };
@@ -586,16 +594,26 @@ fn unweighed(found: &mut Identification, told: Option<&Told>) -> Option<String> 
 }
 
 /// What the torque of the hands was made of.
-fn of_wheel(inertia: f64, options: &Options) -> String {
+fn of_wheel(inertia: f64, options: &Options, found: &Identification) -> String {
     const FALSE: &str =
         "with an inertia that is much too small k_hg is false, and nothing in the log shows it";
     let (leeway, beside) = match options.wheel_inertia_is {
         Inertia::About => (format!(" (give or take {} %)", 100.0 * WHEEL_SHARE), FALSE),
         Inertia::Exact => (String::new(), FALSE),
-        Inertia::Sought => (
-            " (estimated)".to_owned(),
-            "what the inertia may err by is in the errors of the others",
-        ),
+        Inertia::Sought => {
+            let wheel = found.beyond.iter().find(|b| b.0 == "wheel_inertia");
+            if wheel.is_some_and(|(_, wheel)| wheel.interval_95.is_some()) {
+                (
+                    " (estimated)".to_owned(),
+                    "what the inertia may err by is in the errors of the others",
+                )
+            } else {
+                (
+                    " (where the search ended)".to_owned(),
+                    "the inertia is not identified, and nothing else is",
+                )
+            }
+        }
     };
     let damping = options.wheel_damping();
     let about = match options.wheel_damping {

@@ -146,11 +146,12 @@ const T_NMS_SD_S: f64 = 0.03;
 const K_NMS_SD: f64 = 0.25;
 /// The standard deviation of a wheel's inertia about what the caller says, as a share: a wheel is seldom weighed.
 pub(super) const WHEEL_SHARE: f64 = 0.1;
-/// Where a wheel's inertia is sought, kg.m2: what steering wheels have.
+/// Inertia of steering wheels, in which one is sought, kg.m2.
 pub(crate) const SOUGHT_KG_M2: [f64; 2] = [0.005, 0.1];
-/// Most times that it is, and the share of its standard error at which it is found.
-const MOST_WEIGHED: usize = 8;
-const WEIGHED: f64 = 0.05;
+/// Most rounds of the search for an inertia.
+const MOST_ROUNDS: usize = 8;
+/// A round that moves it by less than this share of its standard error is the last.
+const SETTLED: f64 = 0.05;
 /// Where both are searched once they are freed, N.m/rad and s.
 const K_NMS_SEARCHED: [f64; 2] = [0.0, 4.0];
 const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
@@ -167,18 +168,21 @@ const SMALLEST_ERROR_NM: f64 = 1e-5;
 
 /// Identifies the driver of `log`.
 pub fn identify(log: &DriveLog, options: &Options) -> Identification {
-    let (prepared, options) = weighed(options, |options| prepare(log, options));
+    let (prepared, options) = with_inertia_sought(options, |options| prepare(log, options));
     identify_prepared(&prepared, &options)
 }
 
 /// A drive as `prepared` with the inertia of the wheel that it tells, and the options with that inertia in them; where none is sought,
 /// both as they are.
-pub(crate) fn weighed(options: &Options, prepared: impl Fn(&Options) -> Prepared) -> (Prepared, Options) {
+pub(crate) fn with_inertia_sought(
+    options: &Options,
+    prepared: impl Fn(&Options) -> Prepared,
+) -> (Prepared, Options) {
     let mut options = options.clone();
     let mut found = prepared(&options);
-    for _ in 0..MOST_WEIGHED {
+    for _ in 0..MOST_ROUNDS {
         let mut problem = Problem::new(&found, &options);
-        if !problem.is_weighed {
+        if !problem.is_inertia_sought {
             break;
         }
         let (optimum, _) = problem.search();
@@ -188,7 +192,7 @@ pub(crate) fn weighed(options: &Options, prepared: impl Fn(&Options) -> Prepared
         };
         let inertia = optimum.point[WHEEL];
         let next = (inertia + told.moves[WHEEL]).clamp(SOUGHT_KG_M2[0], SOUGHT_KG_M2[1]);
-        if (next - inertia).abs() < WEIGHED * told.variance.sqrt() {
+        if (next - inertia).abs() < SETTLED * told.variance.sqrt() {
             break;
         }
         options.wheel_inertia = Some(next);
@@ -239,7 +243,7 @@ struct Problem<'a> {
     wheel: Option<&'a WheelMotion>,
     bounds: Vec<Bounds>,
     /// Whether its inertia is sought.
-    is_weighed: bool,
+    is_inertia_sought: bool,
     /// Rows that the loss is taken over.
     stretches: Vec<Range<usize>>,
     /// Whether anything beyond [`CORE`] is searched.
@@ -289,9 +293,9 @@ impl<'a> Problem<'a> {
         let mut bounds = vec![Bounds::FREE; COUNT + stretches.len()];
         // A driver who steers away from the target line is none.
         bounds[..3].fill(Bounds::new(0.0, f64::INFINITY));
-        let is_weighed = options.wheel_inertia_is == Inertia::Sought;
+        let is_inertia_sought = options.wheel_inertia_is == Inertia::Sought;
         // Beside an inertia that is sought, a quicker arm than the one assumed looks like more than 1.
-        bounds[K_HG] = Bounds::new(0.0, if is_weighed { 2.0 } else { 1.0 });
+        bounds[K_HG] = Bounds::new(0.0, if is_inertia_sought { 2.0 } else { 1.0 });
         bounds[T_P] = Bounds::new(0.0, LONGEST_DELAY_S);
         bounds[RHO] = Bounds::new(0.0, 0.999_99);
         bounds[THETA] = Bounds::new(0.0, 0.99);
@@ -348,7 +352,7 @@ impl<'a> Problem<'a> {
                 .collect(),
             signals,
             wheel: prepared.wheel.as_ref(),
-            is_weighed,
+            is_inertia_sought,
             bounds,
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],

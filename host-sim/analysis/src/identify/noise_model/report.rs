@@ -157,7 +157,7 @@ impl Problem<'_> {
             .filter(|&i| self.is_free(i))
             .filter_map(|i| Some((NAMES[i]?, parameter(i))));
         let wheel = self
-            .is_weighed
+            .is_inertia_sought
             .then(|| ("wheel_inertia", self.inertia(p, found.told.as_ref())));
         Named {
             parameters,
@@ -263,7 +263,7 @@ impl Problem<'_> {
             );
         } else if !options.manual && !found.k_hg.identified && !active.contradicted[K_HG] {
             notes.push(
-                "k_hg is not identified: the standard error is too large a share of its range 0 to 1. A probe \
+                "k_hg is not identified: the standard error is too large a share of its range. A probe \
                  torque makes it readable; beside a probe, a longer drive or a stronger one does."
                     .to_owned(),
             );

@@ -113,7 +113,7 @@ impl Problem<'_> {
         let core: Vec<usize> = free
             .iter()
             .copied()
-            .filter(|&i| i >= COUNT || i == K_HG && self.is_weighed || !self.bounds[i].touches(p[i]))
+            .filter(|&i| i >= COUNT || i == K_HG && self.is_inertia_sought || !self.bounds[i].touches(p[i]))
             .collect();
         let doubted = self.doubted(&prepared.lane_doubts, p, &kept, &inverse);
         let slow_variance = error_variance * self.log.slow_noise();
@@ -133,7 +133,10 @@ impl Problem<'_> {
         let active = self.active_bounds(optimum, &free, &errors, error_variance);
         errors += doubted.covariance(self.size());
         let constancy = self.constancy(p, error_variance, manual, &mut errors);
-        let mut told = self.is_weighed.then(|| self.inertia_told(optimum)).flatten();
+        let mut told = self
+            .is_inertia_sought
+            .then(|| self.inertia_told(optimum))
+            .flatten();
         if let Some(told) = &mut told {
             let by_arm = self.moves_by_arm(optimum, told);
             with_inertia(told, by_arm, &mut errors, &mut alternatives);
