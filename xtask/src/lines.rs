@@ -22,7 +22,7 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("firmware", 3_160),
     ("firmware/lockstep", 200),
     ("host-sim", 3_550),
-    ("host-sim/analysis", 7_390),
+    ("host-sim/analysis", 7_420),
     ("host-sim/batch", 8_830),
     ("host-sim/campaign", 4_150),
     ("host-sim/column", 1_630),

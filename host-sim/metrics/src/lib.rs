@@ -117,10 +117,7 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
     ] = [Moments::default(); 5];
     let [mut out_of_lane, mut limited, mut in_conflict] = [0.0; 3];
     let [mut speeds, mut slowest, mut fastest] = [0.0, f64::INFINITY, 0.0_f64];
-    let torque = |value| without_probe(trace, circumstances.probe_hz, value);
-    let torques = circumstances
-        .probe_hz
-        .map(|_| [torque(|s| s.driver_torque_nm), torque(|s| s.guidance_torque_nm)]);
+    let torques = torques_beside_probe(trace, circumstances.probe_hz);
     let mut times_to_crossing_s = Vec::new();
     let mut are_finite = true;
     // A long trace does not fit into a cache: one pass reads it once.
@@ -136,10 +133,8 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
         guidance.add(t_h);
         out_of_lane += f64::from(sample.lateral_error_m.abs() > half_room_m);
         limited += f64::from(sample.guidance_limited);
-        let (t_d, t_h) = match &torques {
-            Some([driver, guidance]) => (driver[place], guidance[place]),
-            None => (t_d, t_h),
-        };
+        let beside_probe = |[driver, guidance]: &[Vec<f64>; 2]| (driver[place], guidance[place]);
+        let (t_d, t_h) = torques.as_ref().map_or((t_d, t_h), beside_probe);
         if t_d * t_h < 0.0 && t_d.abs().min(t_h.abs()) > CONFLICT_DEAD_BAND_NM {
             in_conflict += 1.0;
             driver_in_conflict.add(t_d);
@@ -214,6 +209,12 @@ pub fn without_probe(trace: &Trace, probe_hz: Option<f64>, value: fn(&Sample) ->
     let record: Vec<f64> = trace.samples.iter().map(value).collect();
     let notched = |hz| zero_phase_notch(&record, trace.sample_rate_hz, hz, PROBE_WIDTH_HZ);
     probe_hz.and_then(notched).unwrap_or(record)
+}
+
+/// The driver's torque and the guidance's without the probe, where there is one.
+fn torques_beside_probe(trace: &Trace, probe_hz: Option<f64>) -> Option<[Vec<f64>; 2]> {
+    let torques: [fn(&Sample) -> f64; 2] = [|s| s.driver_torque_nm, |s| s.guidance_torque_nm];
+    probe_hz.map(|_| torques.map(|torque| without_probe(trace, probe_hz, torque)))
 }
 
 /// Speed of a sample, m/s.
