@@ -105,7 +105,6 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
     let range = samples_in(&trace.samples, circumstances.window);
     let samples = &trace.samples[range.clone()];
     let count = samples.len() as f64;
-    let duration_s = count / trace.sample_rate_hz;
     let half_room_m = (circumstances.lane_width_m - VEHICLE_WIDTH_M) / 2.0;
 
     let [
@@ -133,8 +132,7 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
         guidance.add(t_h);
         out_of_lane += f64::from(sample.lateral_error_m.abs() > half_room_m);
         limited += f64::from(sample.guidance_limited);
-        let beside_probe = |[driver, guidance]: &[Vec<f64>; 2]| (driver[place], guidance[place]);
-        let (t_d, t_h) = torques.as_ref().map_or((t_d, t_h), beside_probe);
+        let [t_d, t_h] = torques.as_ref().map_or([t_d, t_h], |torques| torques[place]);
         if t_d * t_h < 0.0 && t_d.abs().min(t_h.abs()) > CONFLICT_DEAD_BAND_NM {
             in_conflict += 1.0;
             driver_in_conflict.add(t_d);
@@ -146,10 +144,11 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
     if samples.is_empty() || !are_finite {
         return Metrics::default();
     }
+    let to_the_end = &trace.samples[..range.end];
     let recovery = circumstances
         .failure
-        .map(|failure| recovery(&trace.samples[..range.end], &failure))
-        .unwrap_or_default();
+        .map(|failure| recovery(to_the_end, &failure));
+    let recovery = recovery.unwrap_or_default();
     // Where no guidance ever was, none met a limit and none was in conflict: that is no share of zero.
     let is_guided = trace.samples.iter().any(|s| s.guidance_torque_nm != 0.0);
     let of_guidance = |share: f64| finite(share / count).filter(|_| is_guided);
@@ -160,7 +159,7 @@ pub fn measure_asked(trace: &Trace, circumstances: &Circumstances, asked: Asked)
         |kind| reversals_per_min(angle_deg.as_ref()?, trace.sample_rate_hz, range.clone(), kind);
 
     Metrics {
-        duration_s: finite(duration_s),
+        duration_s: finite(count / trace.sample_rate_hz),
         peak_lateral_error_m: finite(lateral.peak_abs()),
         mean_abs_lateral_error_m: finite(lateral.mean_abs(count)),
         sdlp_m: finite(lateral.standard_deviation(count)),
@@ -212,9 +211,11 @@ pub fn without_probe(trace: &Trace, probe_hz: Option<f64>, value: fn(&Sample) ->
 }
 
 /// The driver's torque and the guidance's without the probe, where there is one.
-fn torques_beside_probe(trace: &Trace, probe_hz: Option<f64>) -> Option<[Vec<f64>; 2]> {
-    let torques: [fn(&Sample) -> f64; 2] = [|s| s.driver_torque_nm, |s| s.guidance_torque_nm];
-    probe_hz.map(|_| torques.map(|torque| without_probe(trace, probe_hz, torque)))
+fn torques_beside_probe(trace: &Trace, probe_hz: Option<f64>) -> Option<Vec<[f64; 2]>> {
+    probe_hz?;
+    let driver = without_probe(trace, probe_hz, |s| s.driver_torque_nm);
+    let guidance = without_probe(trace, probe_hz, |s| s.guidance_torque_nm);
+    Some(driver.into_iter().zip(guidance).map(Into::into).collect())
 }
 
 /// Speed of a sample, m/s.
