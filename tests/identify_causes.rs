@@ -211,8 +211,8 @@ fn what_does_not_tell_an_inertia_is_said() {
     for (log, says) in [
         (above_a_bar(probed.clone(), 0.002), "rests on a bound"),
         (above_a_bar(probed.clone(), 0.12), "rests on a bound"),
-        (above_a_bar(unprobed, 0.04), "no probe: "),
-        (silent(above_a_bar(probed.clone(), 0.04)), "no probe: "),
+        (above_a_bar(unprobed, 0.04), "no probe, or"),
+        (silent(above_a_bar(probed.clone(), 0.04)), "no probe, or"),
         (short(above_a_bar(probed, 0.04)), "too short"),
     ] {
         let (wheel, found) = sought(&log, &["wheel_damping=0"]);
@@ -221,7 +221,7 @@ fn what_does_not_tell_an_inertia_is_said() {
         assert!(!identified, "{says}: {:?}", found.parameters);
         // Where something else is refuted, that is told instead of a bound.
         let is_said = found.notes.iter().any(|n| n.contains(says));
-        let is_refuted = !found.refuted.is_empty() && says != "no probe: ";
+        let is_refuted = !found.refuted.is_empty() && says != "no probe, or";
         assert!(
             is_said || is_refuted,
             "{says}: {:?} {:?}",
