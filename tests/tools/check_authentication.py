@@ -1,12 +1,13 @@
 """Authentication by another program: its MACs are those of the PyPI package `cryptography`, its frames those of examples/authentication.py.
 
-    python tests/tools/check_authentication.py HOST_SIM   # compare core/secoc/tests/frames.csv, and drive the ECU of HOST_SIM
+    python tests/tools/check_authentication.py            # compare core/secoc/tests/frames.csv, and drive the lock-step image in QEMU
     python tests/tools/check_authentication.py --table    # write that file
 
 The file is a talk between an ECU at its start 3 and its senders: who speaks, identifier, bytes; `core/secoc/tests/frames.rs` has the
-Rust sides hold it. The ECU does not wait for this program, so a drive in which it came too late is tried again.
+Rust sides hold it. The drive is on the ECU's own time, so that a busy computer changes nothing.
 """
 
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -16,18 +17,19 @@ import cantools
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
 from authentication import CAMERA_KEY, DBC, HOST_KEY, OFFER, Prover, message, tag  # noqa: E402
-from talk_to_the_ecu import DBC as BUS, protected_crc  # noqa: E402
+import talk_to_the_ecu as client  # noqa: E402
 
 TABLE = ROOT / "core/secoc/tests/frames.csv"
 EPOCH = 3 * 4096
 NAMES = ["LanePreview", "Vehicle", "Request", "ParameterWrite", "ParameterUnlock"]
-ATTEMPTS = 5
+AUTHENTICATED, AES_CMAC = 0x7F3, 2  # firmware/lockstep/src/lib.rs
+SECONDS = 3
 
 
 def talk():
-    bus, own = cantools.database.load_file(BUS), cantools.database.load_file(DBC)
+    bus, own = cantools.database.load_file(client.DBC), cantools.database.load_file(DBC)
     numbers = iter(range(0x01020304, 0x7FFFFFFF, 0x11111111))
-    prover = Prover(lambda data: protected_crc(bus.get_message_by_name("Request"), data), number=lambda: next(numbers))
+    prover = Prover(lambda data: client.protected_crc(bus.get_message_by_name("Request"), data), number=lambda: next(numbers))
     lines = []
 
     def said(who, frame):
@@ -35,7 +37,7 @@ def talk():
 
     def sends(name, k):
         data = bytearray((17 * k + 29 * at) % 256 for at in range(8))
-        data[0] = protected_crc(bus.get_message_by_name(name), bytes(data))
+        data[0] = client.protected_crc(bus.get_message_by_name(name), bytes(data))
         frame = message(bus.get_message_by_name(name).frame_id, data)
         said("sender", frame)
         for proven in prover.prove(frame):
@@ -46,7 +48,7 @@ def talk():
     status = own.get_message_by_name("Authentication")
     values = {signal.name: 0 for signal in status.signals} | {f"Authentication_Waiting_{name}": 1 for name in NAMES}
     data = bytearray(status.encode(values | {"Authentication_State": 4}, strict=False))
-    data[0] = protected_crc(status, bytes(data))
+    data[0] = client.protected_crc(status, bytes(data))
     heard = message(status.frame_id, data)
     said("ecu", heard)
     questions = prover.hear(heard)
@@ -64,32 +66,34 @@ def talk():
     return "\n".join(lines) + "\n"
 
 
-def drive(host_sim):
+def drive():
     """The client of the examples against an ECU that uses nothing without a proof, as the ECU itself tells it."""
-    for _ in range(ATTEMPTS):
-        arguments = [host_sim, "ecu", "run", "--listen", "127.0.0.1:0", "--authenticate", "aes-cmac"]
-        ecu = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
-        try:
-            port = "socket://" + ecu.stdout.readline().split(" at ")[1].split(";")[0]
-            client = [sys.executable, ROOT / "examples/talk_to_the_ecu.py", port, "--seconds", "3"]
-            done = subprocess.run(client, capture_output=True, text=True, check=False)
-        finally:
-            ecu.terminate()
-            ecu.wait()
-        print(done.stdout, done.stderr, sep="", end="")
-        if done.returncode == 0:
-            return
-    raise SystemExit(f"no drive in {ATTEMPTS} attempts")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = "127.0.0.1:" + str(free.getsockname()[1])
+    program = ["cargo", "xtask", "qemu", "lockstep", "--timeout", "600", "--can", f"tcp:{port},server,nowait"]
+    with subprocess.Popen(program, cwd=ROOT, stderr=subprocess.PIPE, text=True) as qemu:
+        if not any("lockstep on" in line for line in qemu.stderr):
+            raise SystemExit("cargo xtask qemu lockstep ended")
+        bus, own = cantools.database.load_file(client.DBC), cantools.database.load_file(client.AUTHENTICATION)
+        clock = client.InLockStep(f"socket://{port}")
+        with clock.bus:
+            clock.bus.send(message(AUTHENTICATED, bytes([AES_CMAC] + 7 * [0])))
+            run = client.Run(clock, bus, own.get_message_by_name("Authentication"), client.prepared(bus, None))
+            run.synchronise()
+            if run.prover is None or not run.prover.is_synchronised():
+                raise SystemExit("the ECU asked for no proof")
+            client.drive(run, SECONDS)
 
 
-def main(argument):
-    if argument == "--table":
+def main(arguments):
+    if arguments == ["--table"]:
         TABLE.write_text(talk())
         return
     if TABLE.read_text() != talk():
         raise SystemExit(f"{TABLE} is not what this program makes: --table writes it")
-    drive(argument)
+    drive()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1:])

@@ -19,7 +19,9 @@ use haptic_core::service::download;
 use haptic_diag::isotp::Link;
 use haptic_diag::security::{BENCH_KEY, mac};
 use haptic_pil::PilError;
-use haptic_pil::bench::Bench;
+use haptic_pil::bench::{Algorithm, Bench};
+use haptic_secoc::Keys;
+use haptic_secoc::prover::Prover;
 
 /// The ECU's warning, in somebody else's name.
 const FOREIGN: u16 = 0x0D0;
@@ -155,6 +157,47 @@ impl Client {
         }
         heard
     }
+}
+
+/// `host-sim ecu run --authenticate`: what it hears without a proof is nothing to it, and with one it is.
+#[test]
+fn a_bench_with_keys_hears_what_is_proven() {
+    let mut bench = Bench::start("127.0.0.1:0", Some(Algorithm::AesCmac)).unwrap();
+    let mut client = Client::join(&bench);
+    let mut counter = 0;
+    let speed = Speed::from_m_per_s(20.0);
+    let heard = client.drive(&mut bench, 1000, speed, &mut counter);
+    let is_missing = |heard: &[Frame]| {
+        let told = guidance(heard);
+        told.last().unwrap().faults.contains(Fault::SpeedTimeout)
+    };
+    assert!(is_missing(&heard));
+
+    let mut prover = Prover::new(&Keys::bench(Algorithm::AesCmac));
+    let (mut heard, mut number) = (Vec::new(), 0);
+    for k in 0..1000 {
+        if k % 10 == 0 {
+            let vehicle = Vehicle {
+                speeds: [speed; 2],
+                yaw_rate: None,
+            };
+            let frames = prover.prove(&vehicle.encode(counter));
+            frames.iter().for_each(|frame| client.say(frame));
+            counter = counter.wrapping_add(1);
+        }
+        bench.tick().unwrap();
+        for frame in client.heard() {
+            let next = || {
+                number += 1;
+                number
+            };
+            let questions = prover.hear(&frame, next);
+            questions.iter().for_each(|frame| client.say(frame));
+            heard.push(frame);
+        }
+    }
+    assert!(!is_missing(&heard));
+    bench.end().unwrap();
 }
 
 fn near(values: &[ParameterValue], params: &Params) -> bool {
