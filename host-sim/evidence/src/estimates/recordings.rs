@@ -45,7 +45,7 @@ pub struct Channel {
     pub plant_friction_nm: Option<f64>,
     /// What `identify` is told of it as `--wheel-inertia`, kg.m2.
     pub told_kg_m2: Option<f64>,
-    /// Whether it is to estimate the inertia instead.
+    /// Whether `identify` is told `--wheel-inertia estimate`.
     pub is_sought: bool,
     /// Whether each driver's arm is drawn: t_nms of 0.06 to 0.15 s, K_nms of 0.5 to 1.5 N.m/rad.
     pub other_arm: bool,

@@ -570,7 +570,7 @@ fn why_not_found(found: &mut Identification, told: Option<&Told>) -> Option<Stri
         *wheel = Parameter::not_identified(wheel.optimum?, Bounds::FREE);
     } else if !hidden {
         found.parameters.take_back();
-        found.line = None;
+        (found.line, found.at_t_nms) = (None, None);
     }
     let probe_nm = told.map_or(0.0, |told| told.probe_nm);
     let why = match found.balance.as_ref().and_then(|b| b.friction_nm) {

@@ -242,7 +242,7 @@ struct Problem<'a> {
     /// The motion of the wheel above a torsion bar, where there is one.
     wheel: Option<&'a WheelMotion>,
     bounds: Vec<Bounds>,
-    /// Whether its inertia is sought.
+    /// Whether the inertia of that wheel is sought.
     is_inertia_sought: bool,
     /// Rows that the loss is taken over.
     stretches: Vec<Range<usize>>,
