@@ -81,7 +81,7 @@ pub(crate) struct Options {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Write the figures into docs/explanation/speed.md, with this processor and the commit
+    /// Write the ratios into docs/explanation/speed.md, with this processor and the commit
     #[arg(long, conflicts_with = "json")]
     write: bool,
     /// Rounds, each with every program once.
@@ -131,7 +131,8 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         let speed = median(speeds[program.key].clone());
         table += &format!("| {} | {speed:.0} |\n", program.shown);
     }
-    table += "\n| above 1: ours is faster | ratio |\n|---|---|\n";
+    println!("{table}");
+    let mut table = "| above 1: ours is faster | ratio |\n|---|---|\n".to_owned();
     for (_, shown, over, under) in RATIOS {
         table += &format!("| {} | {:.2} |\n", shown, ratio(over, under));
     }
