@@ -90,6 +90,8 @@ def main(arguments):
     if arguments == ["--table"]:
         TABLE.write_text(talk())
         return
+    if arguments:
+        raise SystemExit(f"{' '.join(arguments)}: there is --table alone")
     if TABLE.read_text() != talk():
         raise SystemExit(f"{TABLE} is not what this program makes: --table writes it")
     drive()
