@@ -49,7 +49,7 @@ fn a_driver_of_ones_own_drives_beside_the_middle_under_the_shipping_ecu() {
         .iter()
         .map(|sample| sample.lateral_error_m.abs())
         .fold(0.0, f64::max);
-    assert_eq!(largest_m, 0.4080224580491433);
+    assert_eq!(largest_m, 0.40802245804924103);
     assert!(
         samples.iter().all(|sample| sample.unguided_cause == 0.0),
         "the ECU guides all the time"

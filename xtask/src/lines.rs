@@ -10,7 +10,7 @@ use std::{fs, io};
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
 pub(crate) const BUDGETS: [(&str, usize); 30] = [
-    ("bench", 400),
+    ("bench", 410),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
     ("bindings/python", 2_230),
@@ -34,9 +34,9 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("host-sim/pil", 2_360),
     ("host-sim/recording", 2_210),
     ("host-sim/report", 6_540),
-    ("host-sim/road", 2_480),
-    ("host-sim/sim", 6_920),
-    ("host-sim/vectorised", 2_900),
+    ("host-sim/road", 2_490),
+    ("host-sim/sim", 6_930),
+    ("host-sim/vectorised", 2_760),
     ("host-sim/vehicle", 1_640),
     ("xtask", 7_270),
     ("xtask/log", 100),

@@ -28,6 +28,10 @@ pub const OVERRUN_M: f64 = 2.0;
 /// the search jumps to and fro across the kink. Its steps are then limited to this length, m, and the kink is taken
 /// as the foot.
 const KINK_M: f64 = 0.5;
+/// What the expansion multiplies with: a division takes several times as long.
+pub const SIXTH: f64 = 1.0 / 6.0;
+/// See [`SIXTH`].
+pub const FORTIETH: f64 = 1.0 / 40.0;
 
 /// A piece of the centreline, expanded about its middle.
 #[derive(Debug, Clone, Copy)]
@@ -48,7 +52,7 @@ pub struct Cell {
     pub curvature_1pm: f64,
     /// Change of curvature with arc length, 1/m^2.
     pub curvature_slope_1pm2: f64,
-    /// A sixth of the curvature's square, and its third power, which each projection needs.
+    /// A sixth of the curvature's square, and a 24th of its third power, which each projection needs.
     pub curvature_powers: [f64; 2],
     /// Which of the terms vanish.
     pub shape: Shape,
@@ -89,7 +93,7 @@ impl Cell {
             heading_rad: middle.heading_rad,
             curvature_1pm: k,
             curvature_slope_1pm2: slope,
-            curvature_powers: [k * k / 6.0, k * k * k],
+            curvature_powers: [k * k / 6.0, k * k * k / 24.0],
             shape: match (slope != 0.0, k != 0.0) {
                 (true, _) => Shape::Clothoid,
                 (false, true) => Shape::Arc,
@@ -103,10 +107,15 @@ impl Cell {
     fn newton(&self, s_m: f64, x_m: f64, y_m: f64) -> Option<(Projection, f64)> {
         let near = self.near(s_m - self.s_m, x_m, y_m);
         let determinant = 1.0 - near.curvature * near.offset_m;
-        if determinant.is_nan() || determinant < MIN_DETERMINANT {
+        // One that is not a number is refused, too.
+        if !(determinant >= MIN_DETERMINANT) {
             return None;
         }
-        let step = near.distance_to_foot / determinant;
+        let step = if near.curvature == 0.0 {
+            near.distance_to_foot
+        } else {
+            near.distance_to_foot / determinant
+        };
         let foot = Projection {
             s_m: s_m + step,
             offset_m: near.offset_m,
@@ -135,18 +144,18 @@ impl Cell {
         }
         // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
         let sigma2 = sigma * sigma;
-        let [square_over_6, cube] = self.curvature_powers;
+        let [square_over_6, cube_over_24] = self.curvature_powers;
         let (theta, along, across, curvature) = if self.shape == Shape::Arc {
             // Without the terms that vanish, to the same bits.
             let along = sigma - sigma2 * sigma * square_over_6;
-            (sigma * k0, along, sigma2 * (0.5 * k0 - cube * sigma2 / 24.0), k0)
+            (sigma * k0, along, sigma2 * (0.5 * k0 - cube_over_24 * sigma2), k0)
         } else {
             let along =
-                sigma - sigma2 * sigma * (square_over_6 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
-            let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - cube * sigma2 / 24.0);
+                sigma - sigma2 * sigma * (square_over_6 + k1 * sigma * (k0 / 8.0 + k1 * sigma * FORTIETH));
+            let across = sigma2 * (0.5 * k0 + k1 * sigma * SIXTH - cube_over_24 * sigma2);
             (sigma * (k0 + 0.5 * k1 * sigma), along, across, k0 + k1 * sigma)
         };
-        let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
+        let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta * SIXTH);
         let (ahead, left) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
         Near {
             theta,

@@ -9,7 +9,7 @@ mod course;
 mod opendrive;
 mod piece;
 
-pub use centreline::{CONVERGED_M, Cell, MIN_DETERMINANT, OVERRUN_M, Shape};
+pub use centreline::{CONVERGED_M, Cell, FORTIETH, MIN_DETERMINANT, OVERRUN_M, SIXTH, Shape};
 pub use centreline::{Centreline, Projection, Tracker};
 pub use course::{COURSE_FIELDS, Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE};
 pub use course::{SEGMENT_FIELDS, Segment, SegmentFile};

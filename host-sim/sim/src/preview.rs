@@ -16,6 +16,8 @@ pub(crate) struct PreviewPoints {
     far_m: f64,
     near: Tracker,
     far: Tracker,
+    /// Steps between the last two looks.
+    apart: u32,
 }
 
 impl PreviewPoints {
@@ -28,12 +30,24 @@ impl PreviewPoints {
             far_m,
             near: road.tracker(near_m),
             far: road.tracker(far_m),
+            apart: 1,
         }
     }
 
     /// Moves them to where they are at another speed.
     pub(crate) fn at_speed(&mut self, v_m_per_s: f64) {
         [self.near_m, self.far_m] = self.times_s.map(|time_s| v_m_per_s * time_s);
+    }
+
+    /// So many steps have passed since the last look: the points are looked for where they have got to by now.
+    #[inline]
+    pub(crate) fn after(&mut self, steps: u32) {
+        if steps != self.apart {
+            let longer = f64::from(steps) / f64::from(self.apart);
+            self.near.advance_m *= longer;
+            self.far.advance_m *= longer;
+            self.apart = steps;
+        }
     }
 
     /// The errors, and the arc lengths of both points, m; `None` where there is no road to look at.

@@ -2,8 +2,8 @@
 //!
 //! World and ECU of [`BATCH`] runs are kept as a structure of arrays, so that an instruction moves four or eight of them at
 //! once: each run has a lane of the vector registers. The widest instructions that the machine has are chosen when a
-//! program runs; sums and products are the same in the same order at any width, and none is contracted. Where a quotient by
-//! a constant is a product (`divide`), it is the same quotient. A lane whose run ended takes the next one.
+//! program runs; sums and products are the same in the same order at any width, and none is contracted. A lane
+//! whose run ended takes the next one.
 //!
 //! The ECU in here is a lean one: it does what the shipping one does while nothing is wrong. Whatever could end guidance is
 //! watched a little more strictly than the shipping ECU watches it, with core's own constants, and a run in which it could
@@ -26,7 +26,6 @@ mod band;
 mod checks;
 mod coast;
 mod counts;
-mod divide;
 mod ecu;
 mod lanes;
 mod nonlinear;
@@ -42,7 +41,6 @@ mod tracked;
 mod world;
 
 use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
 
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::plant::{ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
@@ -179,17 +177,17 @@ pub fn run_batch(scenarios: &[Scenario], options: Options, mut on: impl FnMut(us
         match options.width {
             Width::Widest => block(&mut runs),
             Width::Avx2 => block_of_avx2(&mut runs),
-            Width::Portable => runs.block::<false>(),
+            Width::Portable => runs.block(),
         }
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl+fma", "x86_64+avx2+fma"))]
 fn block(runs: &mut Runs<BATCH>) {
-    runs.block::<{ target_cfg_f!(target_feature = "fma") }>();
+    runs.block();
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn block_of_avx2(runs: &mut Runs<BATCH>) {
-    runs.block::<{ target_cfg_f!(target_feature = "fma") }>();
+    runs.block();
 }

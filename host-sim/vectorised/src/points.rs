@@ -38,12 +38,13 @@ impl<const N: usize> Points<N> {
     /// Looks at the road from a place in a direction, as a unit vector and as an angle, in the runs that are selected.
     /// Which of them has no foot, or an angle that would have to be wrapped, becomes suspect.
     #[inline(always)]
-    pub(super) fn observe<const FUSED: bool>(
+    pub(super) fn observe(
         &mut self,
         roads: &[Arc<Centreline>; N],
         (x, y, direction): (&[f64; N], &[f64; N], &[[f64; N]; 2]),
         chi: &[f64; N],
         selected: &[u64; N],
+        longer: &[f64; N],
         suspect: &mut [u64; N],
     ) {
         let (mut px, mut py) = ([0.0; N], [0.0; N]);
@@ -51,12 +52,12 @@ impl<const N: usize> Points<N> {
             px[l] = x[l] + self.near_m[l] * direction[0][l];
             py[l] = y[l] + self.near_m[l] * direction[1][l];
         }
-        let lost_near = self.near.project::<FUSED, OFFSET>(roads, &px, &py, selected);
+        let lost_near = self.near.project::<OFFSET>(roads, &px, &py, selected, longer);
         for l in 0..N {
             px[l] = x[l] + self.far_m[l] * direction[0][l];
             py[l] = y[l] + self.far_m[l] * direction[1][l];
         }
-        let lost_far = self.far.project::<FUSED, HEADING>(roads, &px, &py, selected);
+        let lost_far = self.far.project::<HEADING>(roads, &px, &py, selected, longer);
         for l in 0..N {
             // An angle that would have to be wrapped is that of a run that turns.
             let e_theta = self.far.found_heading[l] - chi[l];

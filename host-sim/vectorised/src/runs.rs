@@ -15,7 +15,7 @@ use super::rejected::Reason;
 use super::sensing::Senses;
 use super::speeds::Speeds;
 use super::world::Worlds;
-use super::{ALIVE, Step};
+use super::{ALIVE, Step, either};
 use super::{ARM, BETA, WHEEL, WHEEL_RATE, YAW_RATE};
 use haptic_sim::models::driver::Remnant;
 use haptic_sim::models::plant::Transition;
@@ -68,6 +68,10 @@ pub(super) struct Runs<const N: usize> {
     own: [i32; N],
     /// All bits where there is a camera for the guidance.
     looks: [u64; N],
+    /// Steps since the last look at the road, for guidance or for the record, and between the last two: all runs began at
+    /// the same phase.
+    unseen: f64,
+    apart: f64,
     has_remnants: bool,
     /// Whether something is planned in some lane within this block.
     has_events: bool,
@@ -89,6 +93,9 @@ impl<const N: usize> Runs<N> {
             speeds: Speeds::new(),
             own: [0; N],
             looks: [0; N],
+            // As after a block.
+            unseen: f64::from(STEPS_PER_SAMPLE) - 1.0,
+            apart: 3.0,
             has_remnants: false,
             has_events: false,
             steps: every_step.then(|| Vec::with_capacity(BLOCK as usize)),
@@ -231,7 +238,7 @@ impl<const N: usize> Runs<N> {
 
     /// Steps until everything periodic is where it was.
     #[inline(always)]
-    pub(super) fn block<const FUSED: bool>(&mut self) {
+    pub(super) fn block(&mut self) {
         if let Some(steps) = &mut self.steps {
             steps.clear();
         }
@@ -251,23 +258,25 @@ impl<const N: usize> Runs<N> {
                 self.ecus.let_time_pass();
                 self.checks.let_time_pass();
             }
-            self.step::<FUSED>(phase);
+            self.step(phase);
         }
     }
 
     /// One millisecond of every run.
     #[inline(always)]
-    fn step<const FUSED: bool>(&mut self, phase: u32) {
+    fn step(&mut self, phase: u32) {
         let is_sample = phase.is_multiple_of(STEPS_PER_SAMPLE);
         let looks = camera_looks(phase);
+        self.unseen += 1.0;
         if looks || is_sample {
             let mut selected = self.worlds.alive;
-            if !is_sample {
-                for l in 0..N {
-                    selected[l] &= self.looks[l];
-                }
+            let (mut longer, ratio) = ([1.0; N], self.unseen / self.apart);
+            (self.apart, self.unseen) = (self.unseen, 0.0);
+            for l in 0..N {
+                longer[l] = either(self.looks[l], ratio, 1.0);
+                selected[l] &= if is_sample { ALIVE } else { self.looks[l] };
             }
-            self.worlds.camera_looks::<FUSED>(&self.roads, &selected);
+            self.worlds.camera_looks(&self.roads, &selected, &longer);
         }
         self.draw_remnants();
         let mut driver_nm = [0.0; N];
@@ -280,11 +289,11 @@ impl<const N: usize> Runs<N> {
         let torque_nm = si(&self.ecus.applied);
         // Not before: the ECUs do not wait for where the cars moved to, so that the processor has work meanwhile. A run that
         // ends here has decided once more, and nobody has heard it.
-        if self.worlds.driver_looks::<FUSED>(&self.roads) {
+        if self.worlds.driver_looks(&self.roads) {
             self.end_runs();
         }
         if is_sample {
-            self.worlds.locate::<FUSED>(&self.roads);
+            self.worlds.locate(&self.roads);
             self.speeds.locate(&self.worlds.body.s);
             self.record(&driver_nm, &torque_nm);
         }
@@ -299,8 +308,7 @@ impl<const N: usize> Runs<N> {
             }));
         }
         let speeds = self.speeds.of_step(&self.own);
-        self.worlds
-            .move_on::<FUSED>(&torque_nm, speeds, self.has_remnants);
+        self.worlds.move_on(&torque_nm, speeds, self.has_remnants);
         self.speeds.advance(&mut self.worlds, &self.roads);
         for own in &mut self.own {
             *own = own.wrapping_add(1);

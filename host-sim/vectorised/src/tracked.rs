@@ -5,10 +5,11 @@
 
 use std::sync::Arc;
 
-use super::divide::{FORTY, SIX, TWENTY_FOUR};
 use super::lanes::lanes;
 use super::{ALIVE, Aligned, either};
-use haptic_sim::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Shape, Tracker};
+use haptic_sim::models::road::{
+    CONVERGED_M, Centreline, FORTIETH, MIN_DETERMINANT, OVERRUN_M, SIXTH, Shape, Tracker,
+};
 
 /// Steps of a search, of which one or two are the rule.
 const MOST_STEPS: usize = 4;
@@ -31,7 +32,7 @@ lanes! {
         curvature: f64 = 0.0,
         slope: f64 = 0.0,
         square_over_6: f64 = 0.0,
-        cube: f64 = 0.0,
+        cube_over_24: f64 = 0.0,
         /// Largest arc length that a search may end at.
         end: f64 = 0.0,
         /// What was found, as a [`haptic_sim::models::road::Projection`] has it.
@@ -87,7 +88,7 @@ impl<const N: usize> Tracked<N> {
         // A negative zero becomes a positive one, as the straight's own formula has it.
         self.curvature[lane] = cell.curvature_1pm + 0.0;
         self.slope[lane] = cell.curvature_slope_1pm2 + 0.0;
-        [self.square_over_6[lane], self.cube[lane]] = cell.curvature_powers;
+        [self.square_over_6[lane], self.cube_over_24[lane]] = cell.curvature_powers;
         let shape = cell.shape as u8;
         if shape != self.shapes[lane] {
             self.shapes[lane] = shape;
@@ -110,20 +111,22 @@ impl<const N: usize> Tracked<N> {
         }
     }
 
-    /// Projects a point of each run that is selected; returns which of them found no foot.
+    /// Projects a point of each run that is selected, so many times as long after the last look as that was after the one
+    /// before; returns which of them found no foot.
     #[inline(always)]
-    pub(super) fn project<const FUSED: bool, const KEPT: u8>(
+    pub(super) fn project<const KEPT: u8>(
         &mut self,
         roads: &[Arc<Centreline>; N],
         px: &[f64; N],
         py: &[f64; N],
         selected: &[u64; N],
+        longer: &[f64; N],
     ) -> [u64; N] {
         let mut places = Aligned(([0.0; N], [0; N]));
         let (at, outside) = (&mut places.0.0, &mut places.0.1);
         let mut open = *selected;
         for l in 0..N {
-            at[l] = self.s[l] + self.advance[l];
+            at[l] = self.s[l] + self.advance[l] * longer[l];
         }
         for _ in 0..MOST_STEPS {
             let mut is_any_outside = 0;
@@ -136,9 +139,9 @@ impl<const N: usize> Tracked<N> {
                 self.walk(roads, at, outside);
             }
             let left = match self.shape {
-                STRAIGHT => self.search::<STRAIGHT, FUSED, KEPT>(px, py, at, &mut open),
-                ARC => self.search::<ARC, FUSED, KEPT>(px, py, at, &mut open),
-                _ => self.search::<CLOTHOID, FUSED, KEPT>(px, py, at, &mut open),
+                STRAIGHT => self.search::<STRAIGHT, KEPT>(px, py, at, &mut open),
+                ARC => self.search::<ARC, KEPT>(px, py, at, &mut open),
+                _ => self.search::<CLOTHOID, KEPT>(px, py, at, &mut open),
             };
             if left == 0 {
                 break;
@@ -150,7 +153,7 @@ impl<const N: usize> Tracked<N> {
     /// One step of every search that is open; returns whether any still is. A shape's formula is that of the next one
     /// without the terms that vanish, to the same bits.
     #[inline(always)]
-    fn search<const SHAPE: u8, const FUSED: bool, const KEPT: u8>(
+    fn search<const SHAPE: u8, const KEPT: u8>(
         &mut self,
         px: &[f64; N],
         py: &[f64; N],
@@ -169,7 +172,7 @@ impl<const N: usize> Tracked<N> {
                 ARC => (
                     sigma * k0,
                     sigma - sigma2 * sigma * self.square_over_6[l],
-                    sigma2 * (0.5 * k0 - TWENTY_FOUR.divide::<FUSED>(self.cube[l] * sigma2)),
+                    sigma2 * (0.5 * k0 - self.cube_over_24[l] * sigma2),
                     k0,
                 ),
                 _ => (
@@ -177,26 +180,25 @@ impl<const N: usize> Tracked<N> {
                     sigma
                         - sigma2
                             * sigma
-                            * (self.square_over_6[l]
-                                + k1 * sigma * (k0 / 8.0 + FORTY.divide::<FUSED>(k1 * sigma))),
-                    sigma2
-                        * (0.5 * k0 + SIX.divide::<FUSED>(k1 * sigma)
-                            - TWENTY_FOUR.divide::<FUSED>(self.cube[l] * sigma2)),
+                            * (self.square_over_6[l] + k1 * sigma * (k0 / 8.0 + k1 * sigma * FORTIETH)),
+                    sigma2 * (0.5 * k0 + k1 * sigma * SIXTH - self.cube_over_24[l] * sigma2),
                     k0 + k1 * sigma,
                 ),
             };
             let (cos, sin) = match SHAPE {
                 STRAIGHT => (1.0, 0.0),
-                _ => (
-                    1.0 - 0.5 * theta * theta,
-                    theta - SIX.divide::<FUSED>(theta * theta * theta),
-                ),
+                _ => (1.0 - 0.5 * theta * theta, theta - theta * theta * theta * SIXTH),
             };
             let (ahead, left_of) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
             let distance = ahead * cos + left_of * sin;
             let offset = left_of * cos - ahead * sin;
             let determinant = 1.0 - curvature * offset;
-            let step = distance / determinant;
+            // Without curvature it is one.
+            let step = if SHAPE == STRAIGHT {
+                distance
+            } else {
+                distance / determinant
+            };
             let s = at[l] + step;
             let is_sound = (determinant >= MIN_DETERMINANT) & (s >= -OVERRUN_M) & (s <= self.end[l]);
             let is_found = is_sound & (step.abs() < CONVERGED_M);

@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use super::divide::{SIX, TWENTY_FOUR};
 use super::lanes::lanes;
 use super::nonlinear::{Acting, NonlinearVehicles};
 use super::points::Points;
@@ -11,7 +10,7 @@ use super::tracked::{ALL, Tracked};
 use super::{ALIVE, ARM, Aligned, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::delay_steps;
-use haptic_sim::models::plant::{COLUMNS, STATES, Transition};
+use haptic_sim::models::plant::{COLUMNS, STATES, Transition, rotated, unit};
 use haptic_sim::models::road::Centreline;
 use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::{DIVERGED_M, Plan};
@@ -106,12 +105,12 @@ impl<const N: usize> Worlds<N> {
 
     /// The driver looks at the road; returns whether a run that is alive has come to its end.
     #[inline(always)]
-    pub(super) fn driver_looks<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
+    pub(super) fn driver_looks(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
         let selected = self.alive;
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
         self.driver
-            .observe::<FUSED>(roads, place, &chi, &selected, &mut self.suspect);
+            .observe(roads, place, &chi, &selected, &[1.0; N], &mut self.suspect);
         let mut ended = 0;
         for l in 0..N {
             ended |= if self.driver.far.s[l] >= self.end[l] {
@@ -128,25 +127,27 @@ impl<const N: usize> Worlds<N> {
         self.driver.far.s[lane] >= self.end[lane]
     }
 
-    /// The camera looks at the road in the runs that are selected.
+    /// The camera looks at the road in the runs that are selected, so many times as long after the last look as that was
+    /// after the one before.
     #[inline(always)]
-    pub(super) fn camera_looks<const FUSED: bool>(
+    pub(super) fn camera_looks(
         &mut self,
         roads: &[Arc<Centreline>; N],
         selected: &[u64; N],
+        longer: &[f64; N],
     ) {
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
         self.camera
-            .observe::<FUSED>(roads, place, &chi, selected, &mut self.suspect);
+            .observe(roads, place, &chi, selected, longer, &mut self.suspect);
     }
 
     /// Where the centres of gravity are on their roads.
     #[inline(always)]
-    pub(super) fn locate<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N]) {
+    pub(super) fn locate(&mut self, roads: &[Arc<Centreline>; N]) {
         let lost = self
             .body
-            .project::<FUSED, ALL>(roads, &self.x, &self.y, &self.alive);
+            .project::<ALL>(roads, &self.x, &self.y, &self.alive, &[1.0; N]);
         for l in 0..N {
             let is_off = self.body.offset[l].abs() > DIVERGED_M;
             self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
@@ -156,12 +157,7 @@ impl<const N: usize> Worlds<N> {
 
     /// The drivers' eyes and arms, columns and vehicles move for a millisecond, from one speed to the next.
     #[inline(always)]
-    pub(super) fn move_on<const FUSED: bool>(
-        &mut self,
-        torque_nm: &[f64; N],
-        speeds: [&[f64; N]; 2],
-        has_remnants: bool,
-    ) {
+    pub(super) fn move_on(&mut self, torque_nm: &[f64; N], speeds: [&[f64; N]; 2], has_remnants: bool) {
         let mut places = Aligned(([[0.0; N]; STATES], [0.0; N]));
         let (next, next_target) = (&mut places.0.0, &mut places.0.1);
         self.vision(next_target);
@@ -188,14 +184,16 @@ impl<const N: usize> Worlds<N> {
             let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);
             let square = half_turn * half_turn;
             squares[l] = square;
+            let direction = unit([self.direction[0][l], self.direction[1][l]]);
             let (sin, cos) = (
-                half_turn * (1.0 - SIX.divide::<FUSED>(square)),
-                1.0 - square * (0.5 - TWENTY_FOUR.divide::<FUSED>(square)),
+                half_turn * (1.0 - square * (1.0 / 6.0)),
+                1.0 - square * (0.5 - square * (1.0 / 24.0)),
             );
-            let [x, y] = rotated([self.direction[0][l], self.direction[1][l]], sin, cos);
+            let [x, y] = rotated(direction, (sin, cos));
             self.x[l] += self.distance[l] * x;
             self.y[l] += self.distance[l] * y;
-            [self.direction[0][l], self.direction[1][l]] = rotated([x, y], sin, cos);
+            let whole = (2.0 * sin * cos, 1.0 - 2.0 * sin * sin);
+            [self.direction[0][l], self.direction[1][l]] = rotated(direction, whole);
         }
         for l in 0..N {
             self.suspect[l] |= if squares[l] < 1e-6 { 0 } else { self.alive[l] };
@@ -263,12 +261,4 @@ impl<const N: usize> Worlds<N> {
             next[YAW][l] = row(YAW, yaw[l]);
         }
     }
-}
-
-/// A unit vector turned, kept at unit length.
-#[inline(always)]
-fn rotated([x, y]: [f64; 2], sin: f64, cos: f64) -> [f64; 2] {
-    let (x, y) = (x * cos - y * sin, x * sin + y * cos);
-    let scale = 1.5 - 0.5 * (x * x + y * y);
-    [x * scale, y * scale]
 }

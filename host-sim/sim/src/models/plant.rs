@@ -84,8 +84,7 @@ pub struct PlantState {
 #[derive(Debug, Clone)]
 pub struct Plant {
     linear: [f64; STATES],
-    x_m: f64,
-    y_m: f64,
+    position_m: [f64; 2],
     /// Unit vector along the direction of movement. Rotated step by step: a sine and a cosine each
     /// millisecond would cost as much as the whole linear part.
     direction: [f64; 2],
@@ -177,8 +176,7 @@ impl Default for Plant {
     fn default() -> Self {
         Self {
             linear: [0.0; STATES],
-            x_m: 0.0,
-            y_m: 0.0,
+            position_m: [0.0; 2],
             direction: [1.0, 0.0],
         }
     }
@@ -215,12 +213,13 @@ impl Plant {
     /// The place after a step of some length, in which the direction of movement changed.
     #[inline]
     fn advance(&mut self, before: f64, distance_m: f64) {
+        // Before the turn: no step then waits for what takes back the rounding of the last one.
+        let direction = unit(self.direction);
         let half_turn = 0.5 * (self.direction_rad() - before);
-        let turn = sine_and_cosine(half_turn);
-        let [cos, sin] = rotated(self.direction, turn);
-        self.x_m += distance_m * cos;
-        self.y_m += distance_m * sin;
-        self.direction = rotated([cos, sin], turn);
+        let (sin, cos) = sine_and_cosine(half_turn);
+        let ([x_m, y_m], [x, y]) = (self.position_m, rotated(direction, (sin, cos)));
+        self.position_m = [x_m + distance_m * x, y_m + distance_m * y];
+        self.direction = rotated(direction, (2.0 * sin * cos, 1.0 - 2.0 * sin * sin));
     }
 
     /// Its state.
@@ -252,7 +251,7 @@ impl Plant {
 
     /// Position of the centre of gravity, m.
     pub fn position_m(&self) -> [f64; 2] {
-        [self.x_m, self.y_m]
+        self.position_m
     }
 
     /// chi = psi + beta, direction of movement, rad, not wrapped.
@@ -263,10 +262,8 @@ impl Plant {
     /// The point `distance_m` ahead along the direction of movement, m.
     #[inline]
     pub fn ahead_m(&self, distance_m: f64) -> [f64; 2] {
-        [
-            self.x_m + distance_m * self.direction[0],
-            self.y_m + distance_m * self.direction[1],
-        ]
+        let ([x_m, y_m], [x, y]) = (self.position_m, self.direction);
+        [x_m + distance_m * x, y_m + distance_m * y]
     }
 
     /// beta, rad.
@@ -302,17 +299,24 @@ fn sine_and_cosine(angle: f64) -> (f64, f64) {
     // Fifth-order terms are below rounding for the 1e-4 rad of a step; a wild motion that is about to be
     // flagged as diverged may turn faster and gets the library's functions.
     if square < 1e-6 {
-        (angle * (1.0 - square / 6.0), 1.0 - square * (0.5 - square / 24.0))
+        (
+            angle * (1.0 - square * (1.0 / 6.0)),
+            1.0 - square * (0.5 - square * (1.0 / 24.0)),
+        )
     } else {
         angle.sin_cos()
     }
 }
 
-/// `direction` turned by an angle of that sine and cosine, kept at unit length.
-#[inline]
-fn rotated([x, y]: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
-    let (x, y) = (x * cos - y * sin, x * sin + y * cos);
-    // First-order correction of the length, which otherwise drifts by rounding.
+/// `direction` turned by an angle of that sine and cosine.
+#[inline(always)]
+pub fn rotated([x, y]: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
+    [x * cos - y * sin, x * sin + y * cos]
+}
+
+/// A vector that rounding has left almost of unit length, at unit length: its length would drift otherwise.
+#[inline(always)]
+pub fn unit([x, y]: [f64; 2]) -> [f64; 2] {
     let scale = 1.5 - 0.5 * (x * x + y * y);
     [x * scale, y * scale]
 }
@@ -393,7 +397,8 @@ mod tests {
                 "state {state}: {exact} against {oracle}"
             );
         }
-        assert!((plant.x_m - x[6]).abs() < 1e-5 && (plant.y_m - x[7]).abs() < 1e-5);
+        let [x_m, y_m] = plant.position_m;
+        assert!((x_m - x[6]).abs() < 1e-5 && (y_m - x[7]).abs() < 1e-5);
         let [cos, sin] = plant.direction;
         assert!((sin.atan2(cos) - plant.direction_rad()).abs() < 1e-12);
     }

@@ -53,6 +53,8 @@ pub struct Simulation<G = AnyGuidance, S = PaperPair> {
     sensing: Option<Box<Sensing>>,
     driver_points: PreviewPoints,
     camera: PreviewPoints,
+    /// When the camera looked last.
+    camera_step: u32,
     body: Tracker,
     /// Speed of the vehicle now, and where along the road it is.
     speed_m_per_s: f64,
@@ -110,6 +112,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             sensing: Sensing::new(scenario),
             driver_points: PreviewPoints::new(&road, driver_s, v),
             camera: PreviewPoints::new(&road, camera_s, v),
+            camera_step: 0_u32.wrapping_sub(STEPS_PER_SAMPLE),
             body: road.tracker(0.0),
             watch: Watch::default(),
             told: [false; 2],
@@ -175,6 +178,8 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
         let is_sample = self.step.is_multiple_of(STEPS_PER_SAMPLE);
         let looks = self.guidance.looks_at_road(self.step);
         let lane = if looks || is_sample {
+            self.camera.after(self.step.wrapping_sub(self.camera_step));
+            self.camera_step = self.step;
             let seen = self.camera.see(&self.road, &self.driver_vehicle, &motion);
             let Some((errors, _)) = seen else {
                 return self.diverge();
