@@ -155,7 +155,7 @@ pub const WORLDS: [WorldKind; 23] = [
     ),
     more(
         "bar-everything",
-        "everything, but the column and assist of bar, with their friction",
+        "everything, with the column of bar, its friction and its assist",
         &[Part::Bar],
     ),
     more(
@@ -215,7 +215,7 @@ pub const WORLDS: [WorldKind; 23] = [
         judged: false,
         ..world(
             "blind",
-            "on paper, but the camera sees nothing for 0.5 s, 30 times an hour",
+            "the paper's world, and a camera that sees nothing for 0.5 s, 30 times an hour",
             &[Blind],
         )
     },
