@@ -474,6 +474,39 @@ fn imports_are_read_in_every_form() {
     );
 }
 
+/// The linker optimises all crates at the level of the last one. A program below 3 is scalar throughout: sweeps take five times as
+/// long, and no figure says so.
+#[test]
+fn what_is_handed_on_is_optimised() {
+    let text = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = text.parse().unwrap();
+    let package = |profile: &str| {
+        manifest["profile"][profile]["package"]
+            .as_table()
+            .unwrap()
+            .clone()
+    };
+    let (daily, handed_on) = (package("release"), package("dist"));
+    let level = |of: &toml::Value| of["opt-level"].as_integer();
+    let unoptimised = daily.iter().filter(|(_, of)| level(of) == Some(0));
+    // Which is never handed on.
+    let unoptimised: Vec<_> = unoptimised
+        .map(|(name, _)| name)
+        .filter(|name| *name != "xtask")
+        .collect();
+    assert!(
+        unoptimised.iter().any(|name| *name == "host-sim"),
+        "{unoptimised:?}"
+    );
+    for name in unoptimised {
+        assert_eq!(
+            handed_on.get(name).and_then(level),
+            Some(3),
+            "profile.dist.package.{name}"
+        );
+    }
+}
+
 /// Who a crate grows for is asked where it passes its budget, not file by file.
 #[test]
 fn every_crate_keeps_within_its_budget_of_lines() {
