@@ -10,7 +10,7 @@ use std::{fs, io};
 /// A crate by its place, and the lines that it may have. One grows where another shrinks, or with the reason in the commit.
 #[rustfmt::skip]
 pub(crate) const BUDGETS: [(&str, usize); 30] = [
-    ("bench", 410),
+    ("bench", 420),
     ("bindings/c", 400),
     ("bindings/fmu", 1_700),
     ("bindings/python", 2_230),
