@@ -117,8 +117,8 @@ pub struct Ecu {
 const TURN: u32 = 100;
 /// The monitor is tested every so many steps: twice a second.
 const SELF_TEST: u32 = 512;
-/// A line of the fault history and a test that are due wait for a step without a new sample of the column, so that no step has
-/// the work of both; but no more steps than these.
+/// A line of the fault history that is due waits for a step without a new sample of the column, and a test for one without a
+/// line too; neither waits for more steps than these.
 const PATIENCE: u32 = 3;
 
 impl Ecu {

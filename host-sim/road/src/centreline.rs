@@ -3,8 +3,9 @@
 //! The course is divided into cells; each stores the exact position, heading and curvature at its middle. Inside a
 //! cell the clothoid is replaced by its Taylor expansion about the middle, so a projection needs no trigonometry.
 //! Cells are so short (`MAX_CELL_M`, `MAX_CELL_TURN_RAD`) that the neglected terms stay below 1e-9 m. The foot of the
-//! perpendicular from a point is found by Newton's method, starting at the foot that the same point had in the step
-//! before. A `Tracker` holds that start and moves along with its point, so a course may cross itself.
+//! perpendicular from a point is found by Newton's method, starting where the
+//! point has got to since it was projected last. A `Tracker` holds that start and moves along with its point, so a course may
+//! cross itself.
 
 use super::piece::{Piece, Pose, Surface};
 use super::{Course, Segment};
@@ -28,7 +29,7 @@ pub const OVERRUN_M: f64 = 2.0;
 /// the search jumps to and fro across the kink. Its steps are then limited to this length, m, and the kink is taken
 /// as the foot.
 const KINK_M: f64 = 0.5;
-/// What the expansion multiplies with: a division takes several times as long.
+/// The expansion multiplies with a sixth, as a division takes several times as long.
 pub const SIXTH: f64 = 1.0 / 6.0;
 /// See [`SIXTH`].
 pub const FORTIETH: f64 = 1.0 / 40.0;
@@ -107,8 +108,9 @@ impl Cell {
     fn newton(&self, s_m: f64, x_m: f64, y_m: f64) -> Option<(Projection, f64)> {
         let near = self.near(s_m - self.s_m, x_m, y_m);
         let determinant = 1.0 - near.curvature * near.offset_m;
-        // One that is not a number is refused, too.
-        if !(determinant >= MIN_DETERMINANT) {
+        // A determinant that is not a number is refused, too.
+        let is_sound = determinant >= MIN_DETERMINANT;
+        if !is_sound {
             return None;
         }
         let step = if near.curvature == 0.0 {
@@ -230,14 +232,14 @@ pub struct Projection {
     pub curvature_1pm: f64,
 }
 
-/// Where a moving point was last projected, and how far it had come since the time before.
+/// Where a moving point was last projected, and how far it is expected to come until the next time.
 #[derive(Debug, Clone, Copy)]
 pub struct Tracker {
     /// Number of the cell.
     pub cell: usize,
     /// Arc length, m.
     pub s_m: f64,
-    /// How far it had come, m.
+    /// How far it is expected to come, m: as far as before the last projection, unless the times between are not the same.
     pub advance_m: f64,
 }
 
@@ -448,6 +450,11 @@ impl Centreline {
 /// Displacement along a clothoid that starts with `heading` and `curvature`: exact to rounding for the small turn of half a
 /// cell.
 fn arc(heading: f64, curvature: f64, slope: f64, length: f64) -> (f64, f64) {
+    if curvature == 0.0 && slope == 0.0 {
+        // A straight has one direction.
+        let direction = (heading.cos(), heading.sin());
+        return quadrature(length, |_| direction);
+    }
     quadrature(length, |s| {
         let theta = heading + s * (curvature + 0.5 * slope * s);
         (theta.cos(), theta.sin())

@@ -2,8 +2,8 @@
 //!
 //! World and ECU of [`BATCH`] runs are kept as a structure of arrays, so that an instruction moves four or eight of them at
 //! once: each run has a lane of the vector registers. The widest instructions that the machine has are chosen when a
-//! program runs; sums and products are the same in the same order at any width, and none is contracted. A lane
-//! whose run ended takes the next one.
+//! program runs; sums and products are the same in the same order at any width, and no product is fused with a
+//! sum. A lane whose run ended takes the next one.
 //!
 //! The ECU in here is a lean one: it does what the shipping one does while nothing is wrong. Whatever could end guidance is
 //! watched a little more strictly than the shipping ECU watches it, with core's own constants, and a run in which it could
@@ -182,12 +182,12 @@ pub fn run_batch(scenarios: &[Scenario], options: Options, mut on: impl FnMut(us
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl+fma", "x86_64+avx2+fma"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn block(runs: &mut Runs<BATCH>) {
     runs.block();
 }
 
-#[multiversion(targets("x86_64+avx2+fma"))]
+#[multiversion(targets("x86_64+avx2"))]
 fn block_of_avx2(runs: &mut Runs<BATCH>) {
     runs.block();
 }

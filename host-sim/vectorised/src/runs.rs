@@ -68,9 +68,9 @@ pub(super) struct Runs<const N: usize> {
     own: [i32; N],
     /// All bits where there is a camera for the guidance.
     looks: [u64; N],
-    /// Steps since the last look at the road, for guidance or for the record, and between the last two: all runs began at
-    /// the same phase.
+    /// Steps since the last look at the road, for guidance or for the record: all runs begin with a block.
     unseen: f64,
+    /// Steps between the last two looks.
     apart: f64,
     has_remnants: bool,
     /// Whether something is planned in some lane within this block.
@@ -93,7 +93,7 @@ impl<const N: usize> Runs<N> {
             speeds: Speeds::new(),
             own: [0; N],
             looks: [0; N],
-            // As after a block.
+            // A block leaves these: its last two looks are in the steps 42 and 45.
             unseen: f64::from(STEPS_PER_SAMPLE) - 1.0,
             apart: 3.0,
             has_remnants: false,

@@ -111,8 +111,8 @@ impl<const N: usize> Tracked<N> {
         }
     }
 
-    /// Projects a point of each run that is selected, so many times as long after the last look as that was after the one
-    /// before; returns which of them found no foot.
+    /// Projects a point of each run that is selected; returns which of them found no foot. `longer` is the time since the
+    /// last look over the time between the last two.
     #[inline(always)]
     pub(super) fn project<const KEPT: u8>(
         &mut self,
@@ -193,7 +193,7 @@ impl<const N: usize> Tracked<N> {
             let distance = ahead * cos + left_of * sin;
             let offset = left_of * cos - ahead * sin;
             let determinant = 1.0 - curvature * offset;
-            // Without curvature it is one.
+            // Without curvature the determinant is one.
             let step = if SHAPE == STRAIGHT {
                 distance
             } else {

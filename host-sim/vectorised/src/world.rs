@@ -127,8 +127,8 @@ impl<const N: usize> Worlds<N> {
         self.driver.far.s[lane] >= self.end[lane]
     }
 
-    /// The camera looks at the road in the runs that are selected, so many times as long after the last look as that was
-    /// after the one before.
+    /// The camera looks at the road in the runs that are selected. `longer` is the time since the last look over the time
+    /// between the last two.
     #[inline(always)]
     pub(super) fn camera_looks(
         &mut self,

@@ -213,7 +213,7 @@ impl Plant {
     /// The place after a step of some length, in which the direction of movement changed.
     #[inline]
     fn advance(&mut self, before: f64, distance_m: f64) {
-        // Before the turn: no step then waits for what takes back the rounding of the last one.
+        // The length is corrected before the turn, as that needs no angle: neither place nor direction waits for it.
         let direction = unit(self.direction);
         let half_turn = 0.5 * (self.direction_rad() - before);
         let (sin, cos) = sine_and_cosine(half_turn);

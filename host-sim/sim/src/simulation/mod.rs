@@ -53,7 +53,7 @@ pub struct Simulation<G = AnyGuidance, S = PaperPair> {
     sensing: Option<Box<Sensing>>,
     driver_points: PreviewPoints,
     camera: PreviewPoints,
-    /// When the camera looked last.
+    /// The step of the camera's last look; at first a sample before the start, so that no two looks are 0 steps apart.
     camera_step: u32,
     body: Tracker,
     /// Speed of the vehicle now, and where along the road it is.
