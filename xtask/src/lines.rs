@@ -36,7 +36,7 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("host-sim/report", 6_540),
     ("host-sim/road", 2_490),
     ("host-sim/sim", 6_930),
-    ("host-sim/vectorised", 2_760),
+    ("host-sim/vectorised", 2_790),
     ("host-sim/vehicle", 1_640),
     ("xtask", 7_270),
     ("xtask/log", 100),

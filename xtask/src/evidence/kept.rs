@@ -36,7 +36,7 @@ pub(super) struct Origin {
     pub(super) same: Option<Same>,
 }
 
-/// Code that gave the same results, to the last digit, in the first of the runs.
+/// Code that gave the same results, to nine digits, in the first of the runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Same {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::kept::{Campaign, Cell, Earlier, Kept, Numbers, Origin, Row, Same};
 use super::list::{List, Measurement, Rule, Seeds};
@@ -130,7 +131,7 @@ pub(super) fn same(list: &List, names: &[String], then: &Path) -> Result<()> {
             Ok::<_, anyhow::Error>(lines)
         };
         let [then, now] = [lines(then, kept.origin.holds_at())?, lines(&today, &commit)?];
-        if let Some((then, now)) = then.iter().zip(&now).find(|(then, now)| then != now) {
+        if let Some((then, now)) = then.iter().zip(&now).find(|(then, now)| !are_alike(then, now)) {
             bail!("{name} has to be measured again. It was\n{then}\nand is\n{now}");
         }
         ensure!(
@@ -148,6 +149,25 @@ pub(super) fn same(list: &List, names: &[String], then: &Path) -> Result<()> {
 }
 
 /// The commit of a tree that does not differ from it but in the documents, which this command writes.
+/// Whether two results are the same to nine digits, which is more than any document shows: another order of a sum changes the
+/// last ones.
+fn are_alike(then: &Value, now: &Value) -> bool {
+    match (then, now) {
+        (Value::Number(then), Value::Number(now)) => {
+            let [then, now] = [then, now].map(|number| number.as_f64().unwrap_or(f64::NAN));
+            (then - now).abs() <= 1e-9 * then.abs().max(1.0)
+        }
+        (Value::Array(then), Value::Array(now)) => {
+            then.len() == now.len() && then.iter().zip(now).all(|(then, now)| are_alike(then, now))
+        }
+        (Value::Object(then), Value::Object(now)) => {
+            let mut pairs = then.iter().zip(now);
+            then.len() == now.len() && pairs.all(|((a, then), (b, now))| a == b && are_alike(then, now))
+        }
+        _ => then == now,
+    }
+}
+
 fn clean_commit() -> Result<String> {
     let differing = output(command("git").args(["status", "--porcelain", "--", ".", ":!docs"]))?;
     ensure!(
@@ -295,10 +315,10 @@ impl Run<'_> {
     }
 
     /// Its results, a line each.
-    fn lines(&self, rule: Rule) -> Result<Vec<String>> {
-        let lines: serde_json::Result<Vec<String>> = match rule {
-            Rule::Seeds(_) => self.campaign()?.0.iter().map(serde_json::to_string).collect(),
-            Rule::Hours(_) => self.availability()?.iter().map(serde_json::to_string).collect(),
+    fn lines(&self, rule: Rule) -> Result<Vec<Value>> {
+        let lines: serde_json::Result<Vec<Value>> = match rule {
+            Rule::Seeds(_) => self.campaign()?.0.iter().map(serde_json::to_value).collect(),
+            Rule::Hours(_) => self.availability()?.iter().map(serde_json::to_value).collect(),
         };
         Ok(lines?)
     }

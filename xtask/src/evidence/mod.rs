@@ -45,7 +45,7 @@ pub(crate) struct Options {
     /// Why held-out seeds are used once more: with other code, or more or fewer of them. The documents say it
     #[arg(long, value_name = "WHY")]
     again: Option<String>,
-    /// See whether today's code gives the same in the first twentieth of the runs, to the last digit, and keep the figures if it
+    /// See whether today's code gives the same in the first twentieth of the runs, to nine digits, and keep the figures if it
     /// does. PROGRAM is the one of their commit: target/release/evidence of a checkout of it
     #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["seeds", "hours", "again"])]
     same: Option<PathBuf>,
