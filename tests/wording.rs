@@ -1,8 +1,6 @@
 //! Doc comments stand alone: a reader meets one in the documentation of an item, without the item before it. So none begins
 //! as the rest of a sentence that stands elsewhere.
 
-use std::path::Path;
-
 use crate::layering::{root, sources_below};
 
 /// Where there is source code.
@@ -12,9 +10,6 @@ const TOPS: [&str; 8] = [
 
 /// Beginnings that lean on what stands before.
 const LEANING: [&str; 5] = ["The same", "Of", "As", "With", "Those"];
-
-/// Crates with comments of that kind from before this rule, and how many at most. A number only ever falls.
-const NOT_YET: [(&str, usize); 1] = [("host-sim/analysis", 7)];
 
 /// The text of a doc comment's line, and its marker.
 fn doc(line: &str) -> Option<(&str, &str)> {
@@ -49,29 +44,16 @@ fn leaning(text: &str) -> Vec<usize> {
 fn no_doc_comment_leans_on_the_one_before() {
     for top in TOPS {
         let mut wrong = Vec::new();
-        let mut not_yet = [0; NOT_YET.len()];
         for path in sources_below(&root().join(top)) {
             let name = path.strip_prefix(root()).unwrap();
             let found = leaning(&std::fs::read_to_string(&path).unwrap());
-            match NOT_YET
-                .iter()
-                .position(|(crate_, _)| name.starts_with(Path::new(crate_)))
-            {
-                Some(k) => not_yet[k] += found.len(),
-                None => wrong.extend(found.iter().map(|line| format!("{}:{line}", name.display()))),
-            }
+            wrong.extend(found.iter().map(|line| format!("{}:{line}", name.display())));
         }
         assert!(
             wrong.is_empty(),
             "doc comments that begin with {LEANING:?}:\n{}",
             wrong.join("\n")
         );
-        for ((name, most), count) in NOT_YET.iter().zip(not_yet) {
-            assert!(
-                count <= *most,
-                "{name}: {count} doc comments begin with {LEANING:?}, {most} did"
-            );
-        }
     }
 }
 

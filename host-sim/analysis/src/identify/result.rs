@@ -179,7 +179,7 @@ impl Parameter {
         }
     }
 
-    /// Of a search that ended at `optimum`, which says nothing of the parameter.
+    /// A parameter of which a search that ended at `optimum` says nothing.
     pub(crate) fn not_identified(optimum: f64, bounds: Bounds) -> Self {
         Self {
             on_bound: bounds.touches(optimum),
@@ -349,7 +349,7 @@ pub struct Correlation {
 }
 
 impl Correlation {
-    /// Of the `free` parameters that have a name, from the covariance of the errors.
+    /// What ties the `free` parameters that have a name, from the covariance of the errors.
     pub(crate) fn new(names: &[Option<&'static str>], errors: &DMatrix<f64>, free: &[usize]) -> Self {
         let shown: Vec<(usize, &'static str)> = free
             .iter()

@@ -505,7 +505,7 @@ mod tests {
         );
     }
 
-    /// Of a record of 200 s, a part of 10 s at least can be fitted.
+    /// A part of 10 s at least of a record of 200 s can be fitted.
     #[test]
     fn a_cure_leaves_something() {
         let change = |from: f64, to: f64| Change {

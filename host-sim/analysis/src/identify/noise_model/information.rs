@@ -87,7 +87,7 @@ impl Truth {
 }
 
 impl Information {
-    /// Of both records.
+    /// What both records tell together.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         Self {
@@ -96,7 +96,7 @@ impl Information {
         }
     }
 
-    /// Of a record like this that is so long.
+    /// What a record like this would tell if it were so long.
     #[must_use]
     pub fn lasting(&self, span_s: f64) -> Self {
         let share = span_s / self.span_s;

@@ -159,7 +159,7 @@ const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
 /// Expected improvement, as a share of the loss, below which the search ends. With tens of thousands of rows
 /// this leaves the estimate within two hundredths of a standard error of the optimum.
 const TOLERANCE: f64 = 1e-8;
-/// The same where it is only to be seen which of two ends is the better one.
+/// The share of the loss below which a search ends that only has to show which of two ends is the better one.
 const COMPARED: f64 = 1e-5;
 /// Prediction errors below this, N.m, are those of interpolation in a record without noise: no sensor resolves
 /// them, and no share of them is worth an iteration. They are systematic, so that the rows do not average them out

@@ -69,7 +69,7 @@ pub(super) struct ActiveBounds {
     pub(super) pull: DVector<f64>,
     /// Parameters on a bound that the data contradict, and where they would be without it.
     pub(super) bounds: Vec<(usize, f64)>,
-    /// Those, and all that move with them.
+    /// Parameters on a contradicted bound, and all that move with them.
     pub(super) contradicted: [bool; COUNT],
 }
 
