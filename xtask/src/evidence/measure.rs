@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::kept::{Campaign, Cell, Earlier, Kept, Numbers, Origin, Row, Same};
 use super::list::{List, Measurement, Rule, Seeds};
-use super::{all_kept, document, kept_in, replace, stale};
+use super::{PROGRAM, all_kept, document, kept_in, replace, stale};
 use crate::built::Built;
 use crate::tool::{Usage, command, output, root};
 
@@ -30,9 +30,6 @@ impl Asked<'_> {
         }
     }
 }
-
-/// How a person starts the program.
-pub(super) const PROGRAM: &str = "cargo xtask";
 
 /// Rows of the campaign that run at once: what an interruption costs at most.
 const AT_ONCE: usize = 16;
@@ -379,9 +376,28 @@ fn rows_of(table: &str, on_target: bool, has_bar: bool) -> Vec<String> {
 mod tests {
     use std::collections::BTreeMap;
 
+    use serde_json::json;
+
     use super::super::kept::Origin;
     use super::super::list::Rule;
-    use super::{rows_of, uses};
+    use super::{are_alike, rows_of, uses};
+
+    #[test]
+    fn results_are_alike_to_nine_digits_and_in_every_count() {
+        let row = |noticed: u32, deviation_m: f64| json!({"noticed": noticed, "after_ms": [7, null], "deviation_m": deviation_m});
+        let then = row(14, 1.349_577_207_018_047_2);
+        assert!(
+            are_alike(&then, &row(14, 1.349_577_207_018_066)) && are_alike(&then, &row(14, 1.349_577_208))
+        );
+        for other in [
+            row(15, 1.349_577_207),
+            row(14, 1.349_577_21),
+            json!({"noticed": 14}),
+            json!([14]),
+        ] {
+            assert!(!are_alike(&then, &other), "{other}");
+        }
+    }
 
     /// What the uses of held-out seeds allow to "relying" with so many of them, and what is then said of earlier ones.
     fn said(of: &str, is_other: bool, seeds: u64, again: Option<&str>) -> Result<Vec<String>, String> {

@@ -22,6 +22,8 @@ use kept::Kept;
 use list::{List, Seeds};
 use stale::State;
 
+/// How a person starts a measurement's program.
+const PROGRAM: &str = "cargo xtask";
 /// The list.
 const LIST: &str = "docs/evidence.toml";
 /// The mode without a measurement.

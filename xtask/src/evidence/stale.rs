@@ -4,9 +4,9 @@ use std::fmt;
 
 use anyhow::Result;
 
+use super::PROGRAM;
 use super::kept::Kept;
 use super::list::{Measurement, Rule};
-use super::measure::PROGRAM;
 use crate::tool::{command, output, root};
 
 pub(super) enum State {
