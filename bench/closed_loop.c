@@ -12,7 +12,7 @@
  * errors at 120 Hz and sends them through protected frames, the torque comes back in one, and the body is looked at with
  * 200 Hz: as often as the simulator does.
  *
- * It is one file on purpose: a peer that a stranger compiles with one command and reads from
+ * Above 500 lines because it is one file on purpose: a peer that a stranger compiles with one command and reads from
  * equation to trace, with nothing shared.
  *
  * Not here: modes, envelope, monitor, noise, courses other than the paper-course.

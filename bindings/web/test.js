@@ -19,8 +19,8 @@ const slide = async (id, value) => { const input = $(id); input.value = value; i
 const said = () => $("said").textContent;
 
 // Every number of the command line's record that the page shows. The sines of a browser and of a system may differ in the
-// last bit, and a closed loop carries it on: a peak behind a bar differs by 2e-12 of itself. No digit of a log does.
-const close = (ours, theirs) => Object.is(ours, theirs) || Math.abs(ours - theirs) <= 1e-11 * Math.abs(theirs);
+// last bit, and so may a mean of thousands of samples; no digit of a log does.
+const close = (ours, theirs) => Object.is(ours, theirs) || Math.abs(ours - theirs) <= 1e-12 * Math.abs(theirs);
 let compared = 0, exact = 0;
 const differ = (metrics, expected) => SHOWN.filter(key => {
   compared++;
@@ -194,7 +194,9 @@ async function bar() {
   const { csv: ours, channels, metrics, now } = await page.drives.ask(page.drives.job(settings, { steps: 1e6, csv: true })), expected = JSON.parse(bar_ran);
   const lines = bar_csv.trimEnd().split("\n"), names = lines[0].split(","), of = name => lines.slice(1).map(line => Number(line.split(",")[names.indexOf(name)]));
   const differing = ours.trimEnd().split("\n").filter((line, i) => line !== lines[i]).length;
-  check("command line, bar", differing === 0 && names.includes("bar_torque_nm") && !differ(metrics, expected).length && Object.is(now.k_hg, expected.k_hg.k_hg), `${lines.length} lines of run.csv, ${differing} differ; K_hg ${now.k_hg}; ${differ(metrics, expected).map(key => `${key} ${metrics[key]} ${expected[key]}`)}`);
+  // Behind a bar the peak is held in roundings of a coordinate: of the road's 2 to 4 km one is 2^-41 m, a relative error of 7e-13 of this peak.
+  const others = differ(metrics, expected).filter(key => key !== "peak_lateral_error_m" || !(Math.abs(metrics[key] - expected[key]) <= 4 * 2 ** -41));
+  check("command line, bar", differing === 0 && names.includes("bar_torque_nm") && !others.length && Object.is(now.k_hg, expected.k_hg.k_hg), `${lines.length} lines of run.csv, ${differing} differ; K_hg ${now.k_hg}; ${others}`);
   // The page's lines beside the columns of the command line's log: a digit of rounding; noise and lag of the sensor; the ECU's delay and the steps of its angle.
   const far = (channel, column) => { const theirs = of(column); return [...channels[channel]].map((value, i) => value - theirs[i]); }, most = (channel, column) => Math.max(...far(channel, column).map(Math.abs));
   // Of each second the mean: without noise, steps and delay.

@@ -1,5 +1,7 @@
 //! Encode and decode against the DBC file, through a DBC parser and a bit extractor that know nothing of the
 //! core's layout.
+//!
+//! Above 500 lines because it is one file format and all of its messages: split, a reader could not see which one lacks a check.
 
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::e2e::{Protection, ReceiverState};

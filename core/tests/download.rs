@@ -1,4 +1,7 @@
 //! A set of parameters over the bus: taken only whole, in order, in Standby and within its ranges.
+//!
+//! Above 500 lines because one transfer has many rules, which the last test states together: split, a reader could not see
+//! which rule lacks its own test.
 
 use std::num::NonZeroU32;
 

@@ -1,4 +1,7 @@
 //! The ECU from its frames: how it comes up, what each class of fault makes of it, and when.
+//!
+//! Above 500 lines because the classes of faults are one table of cases on one rig: split, a reader could not see
+//! whether a class lacks a case.
 
 use crate::rig::Rig;
 use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};

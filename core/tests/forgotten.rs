@@ -1,4 +1,7 @@
 //! What has to be forgotten after a loss, and what a doubt about a speed does to the torque.
+//!
+//! Above 500 lines because each state that a loss has to clear has its test, and the last goes through every loss: split, a
+//! reader could not see which state lacks one.
 
 use crate::rig::{Rig, SPEED};
 use haptic_core::controller::config::Setup;

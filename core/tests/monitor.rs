@@ -1,4 +1,7 @@
 //! Each rule of the independent monitor at its edge, with frames packed here by hand.
+//!
+//! Above 500 lines because each rule is tried at its edge on one bench: split, a reader could not see which rule lacks an
+//! edge.
 
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;

@@ -3,6 +3,9 @@
 //!
 //! The vehicle is steered by a preview driver along a line of given curvature, in small angles about that line.
 //! The closed loop with the whole ECU is in the fault campaign.
+//!
+//! Above 500 lines because honest driving and lies take the same vehicle: split, a margin that one test widens could not be
+//! seen to spoil another.
 
 use haptic_core::controller::config::Config;
 use haptic_core::lane::LaneSample;

@@ -1,4 +1,6 @@
 //! Both sides on a bus that loses, swaps and repeats frames, and resets of either.
+//!
+//! Above 500 lines because the tests share one bus with both sides on it: split, it would be there twice.
 
 use std::collections::HashSet;
 

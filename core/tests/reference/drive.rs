@@ -5,6 +5,9 @@
 //! ```text
 //! HAPTIC_DRIVES=1000 cargo test --release -p haptic-core reference:: -- --nocapture
 //! ```
+//!
+//! Above 500 lines because a seed draws the world, what goes wrong and when in one order: split, a reader could not follow
+//! what makes a drive repeat.
 
 use super::Reference;
 use super::frames::Frames;

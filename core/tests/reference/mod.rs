@@ -5,6 +5,9 @@
 //! Where a value lies closer to a bound than both implementations round, either decision is right: a *tie*, which ends the drive.
 //!
 //! Not here: the monitor, which refuses nothing in these drives, memory faults, and the estimator.
+//!
+//! Above 500 lines because a step's order and the state that it moves stand together; what can stand alone (checks,
+//! receivers, motor) has files of its own.
 
 mod checks;
 mod coast;

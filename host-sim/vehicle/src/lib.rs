@@ -6,6 +6,9 @@
 //! bias nothing. Errors of the first fit are carried into the second.
 //!
 //! What the record does not tell is not identified, and [`Manoeuvre`] says which drive would tell it. Not here: reading files.
+//!
+//! Above 500 lines because the result's fields stand beside the two fits that fill them: split, a reader could not see which
+//! fit a field comes from.
 
 mod fit;
 mod log;

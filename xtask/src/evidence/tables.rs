@@ -88,7 +88,7 @@ fn measured(origin: &Origin) -> String {
         .as_ref()
         .map_or(String::new(), |Same { commit, count }| {
             let commit = short(commit);
-            format!("; at `{commit}` the same to nine digits in {count}")
+            format!("; `{commit}` gives the same to nine digits in {count}")
         });
     format!(
         "Measured at commit `{}` of {} {ran}, {rule}{held_out}{same}",

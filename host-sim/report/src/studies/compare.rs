@@ -1,4 +1,7 @@
 //! What a comparison of laws and drivers shows: a matrix for each metric, what each driver pays, and where a law does not help.
+//!
+//! Above 500 lines because it is one report: split, a reader could not see whether a figure, a table and a note say the same
+//! thing.
 
 use super::{listed, with_interval};
 use crate::document::{Block, Cell, Report, Section, Table};

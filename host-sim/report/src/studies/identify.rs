@@ -1,5 +1,8 @@
 //! What one identification shows: measured and simulated torque (as the paper's figure 6), the residuals, the driver over time,
 //! the parameters and what they rest on.
+//!
+//! Above 500 lines because it is one report: split, a reader could not see whether a verdict stands in its table, its
+//! sentence and its figure alike.
 
 use super::{pieces, place};
 use crate::document::{Block, Cell, Report, Section, Table};

@@ -239,7 +239,7 @@ fn other_code_that_gives_the_same_is_said() {
     let own: Origin = serde_json::from_str(text).unwrap();
     assert_eq!(
         origin(&[("paper", Some(&own))]),
-        "Measured at commit `0123456789ab` of 2026-11-25 on seeds 1 to 500 of each row, as fixed before; at `fedcba987654` the same \
+        "Measured at commit `0123456789ab` of 2026-11-25 on seeds 1 to 500 of each row, as fixed before; `fedcba987654` gives the same \
          to nine digits in 25 seeds: `cargo xtask evidence paper`.\n"
     );
     assert_eq!(own.holds_at(), "fedcba9876543210");
