@@ -9,8 +9,8 @@
  * Terms: a tick is 1 ms. A foot is the point of the centreline nearest to a point in the plane. Near and far
  * points lie v*t_n and v*t_f ahead along the direction of movement chi = psi + beta. Positive is left everywhere.
  * `--sensors exact` hands the law exact errors each tick, and looks at the body each tick; `--sensors paper` takes the
- * errors at 120 Hz and sends them through protected frames, the torque comes back in one, and the body is looked at with
- * 200 Hz: as often as the simulator does.
+ * errors at 120 Hz and sends them through protected frames, the torque comes back in one, and 200 times a second a sample
+ * is kept: looks and record are those of the simulator.
  *
  * Above 500 lines because it is one file on purpose: a peer that a stranger compiles with one command and reads from
  * equation to trace, with nothing shared.
@@ -40,7 +40,7 @@ static const double TICK = 1e-3;           /* s: control period and plant step *
 static const double SPEED = 60.0 / 3.6;    /* m/s */
 static const double TORQUE_LIMIT = 5.0;    /* N.m, section 3.2 */
 static const double LANE_RATE = 120.0;     /* Hz, lane samples */
-enum { BODY_EVERY = 5 };                   /* ticks between looks at the body: 200 Hz */
+enum { SAMPLE_EVERY = 5 };                 /* ticks between samples, which look at the body and through the camera: 200 Hz */
 static const double RATE_CORNER = 10.0;    /* Hz, low-pass on the differenced 120 Hz samples; our choice */
 static const double MANUAL_K_D = 4.0;      /* section 5.1 */
 static const double DIVERGED_BEYOND = 50.0; /* m off the centreline */
@@ -411,7 +411,7 @@ typedef struct {
 } Options;
 
 typedef struct {
-    long steps, frames, rejected, window_ticks;
+    long steps, samples, frames, rejected, window_ticks;
     double peak, sum, peak_t_h, peak_t_d;
     double column_sum; /* of the decoded column frames: their reader, so that no work can be optimised away */
     bool diverged;
@@ -419,14 +419,21 @@ typedef struct {
 
 enum { DELAY_LINE = 1024 }; /* ticks; a power of two */
 
-static Result run(const Options *o, const Road *road, const Plant *plant, FILE *trace)
+/* What is kept of an instant, as the simulator does. */
+typedef struct {
+    double time, s, offset, heading_error, curvature, e_y, e_theta, guidance_e_y, guidance_e_theta;
+    double phi, phi_rate, yaw_rate, beta, speed, t_d, t_h;
+} Sample;
+
+static Result run(const Options *o, const Road *road, const Plant *plant, Sample *sample, long capacity, FILE *trace)
 {
     Result r = {0};
     double x[STATES] = {0}, u[INPUTS];
     double px = 0, py = 0, c = 1, s = 0; /* centre of gravity; direction of movement */
     double line[DELAY_LINE] = {0}, e_y_integral = 0, e_y_before = 0, phi_target = 0, torque = 0;
     double k_d = o->k_d, k_hg = o->k_hg, next_lane = 0;
-    long last_picture = 0;
+    long last_look = 0;
+    double ge_y = 0, ge_theta = 0;
     Foot body = foot_at(road, 0), near = foot_at(road, SPEED * T_N), far = foot_at(road, SPEED * T_F);
     Foot guide_near = foot_at(road, SPEED * GT_N), guide_far = foot_at(road, SPEED * GT_F);
     Link lane = open_link(0x11), column = open_link(0x22), command = open_link(0x5A);
@@ -450,9 +457,9 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
         if (far.s >= road->length)
             break;
         project(road, &near, px + SPEED * T_N * c, py + SPEED * T_N * s, 1);
-        const bool sees_body = !o->paper_sensors || k % BODY_EVERY == 0;
+        const bool is_sample = k % SAMPLE_EVERY == 0, sees_body = !o->paper_sensors || is_sample;
         if (sees_body)
-            project(road, &body, px, py, o->paper_sensors ? BODY_EVERY : 1);
+            project(road, &body, px, py, o->paper_sensors ? SAMPLE_EVERY : 1);
         if (!(fabs(body.offset) < DIVERGED_BEYOND)) {
             r.diverged = true;
             break;
@@ -472,20 +479,21 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
         const double before = phi_target;
         phi_target = (1 - part) * line[then & (DELAY_LINE - 1)] + part * line[(then - 1) & (DELAY_LINE - 1)];
 
+        /* the camera: a picture in the first tick at or after its due time, and its points for each sample */
+        const bool picture = !o->paper_sensors || time >= next_lane;
+        if (picture)
+            next_lane += 1 / LANE_RATE;
+        if (picture || is_sample) {
+            project(road, &guide_near, px + SPEED * GT_N * c, py + SPEED * GT_N * s, k - last_look);
+            project(road, &guide_far, px + SPEED * GT_F * c, py + SPEED * GT_F * s, k - last_look);
+            last_look = k;
+            ge_y = -guide_near.offset;
+            ge_theta = wrapped(guide_far.heading - chi);
+        }
+
         /* guidance */
         double t_h = 0;
         if (o->guidance) {
-            /* the first tick at or after each sample's due time */
-            const bool picture = !o->paper_sensors || time >= next_lane;
-            double ge_y = 0, ge_theta = 0;
-            if (picture) {
-                next_lane += 1 / LANE_RATE;
-                project(road, &guide_near, px + SPEED * GT_N * c, py + SPEED * GT_N * s, k - last_picture);
-                project(road, &guide_far, px + SPEED * GT_F * c, py + SPEED * GT_F * s, k - last_picture);
-                last_picture = k;
-                ge_y = -guide_near.offset;
-                ge_theta = wrapped(guide_far.heading - chi);
-            }
 #ifdef SHIPPING_ECU
             if (o->paper_sensors) {
                 torque = shipping_step(&shipping, &command, k, picture, ge_y, ge_theta, x[T_D], x[PHI]);
@@ -527,6 +535,10 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
             }
         }
 
+        if (is_sample && r.samples < capacity)
+            sample[r.samples++] = (Sample){
+                time, body.s, body.offset, wrapped(chi - body.heading), body.cell->k + body.cell->dk * (body.s - body.cell->mid),
+                e_y, wrapped(far.heading - chi), ge_y, ge_theta, x[PHI], x[PHI_RATE], x[YAW_RATE], x[BETA], SPEED, x[T_D], t_h};
         if (sees_body && body.s >= o->window_from && body.s <= o->window_to) {
             r.window_ticks++;
             r.sum += fabs(body.offset);
@@ -667,6 +679,12 @@ int main(int argc, char **argv)
     build_crc();
     const Road road = build_road();
     const Plant plant = discretise();
+    const long samples = (long)(1.1 * road.length / (SPEED * TICK * SAMPLE_EVERY));
+    Sample *sample = malloc((size_t)samples * sizeof *sample);
+    if (!sample) {
+        fputs("out of memory\n", stderr);
+        return 1;
+    }
 
     if (o.trace) {
         FILE *trace = fopen(o.trace, "w");
@@ -678,7 +696,7 @@ int main(int argc, char **argv)
         for (int i = 1; i < argc; i++)
             fprintf(trace, " %s", argv[i]);
         fprintf(trace, "\nt_s,s_m,lateral_error_m,guidance_torque_nm,driver_torque_nm,wheel_angle_rad\n");
-        run(&o, &road, &plant, trace);
+        run(&o, &road, &plant, sample, samples, trace);
         if (fclose(trace)) {
             perror(o.trace);
             return 2;
@@ -688,8 +706,9 @@ int main(int argc, char **argv)
     Result r = {0};
     for (long i = 0; i < o.repeat; i++) {
         double start = now();
-        r = run(&o, &road, &plant, NULL);
+        r = run(&o, &road, &plant, sample, samples, NULL);
         spent = fmin(spent, now() - start);
+        __asm__ volatile("" : : "r"(sample) : "memory"); /* a reader for the samples, so that they are written */
     }
     const double simulated = (double)r.steps * TICK;
     const bool seen = r.window_ticks > 0;
@@ -709,6 +728,7 @@ int main(int argc, char **argv)
     print_number("column_sum", r.column_sum, true);
     printf("\"steps\": %ld, \"frames\": %ld, \"frames_rejected\": %ld, \"diverged\": %s}\n", r.steps, r.frames,
            r.rejected, r.diverged ? "true" : "false");
+    free(sample);
     free(road.cell);
     return 0;
 }
