@@ -185,8 +185,21 @@ fn programs() -> Result<Vec<Program>> {
         program: program.into(),
         arguments: arguments.into(),
     };
+    // What is compared runs one after the other: a processor's clock drifts.
     Ok(vec![
         program("ours", "ours (shipping ECU)", &ours, &once),
+        program(
+            "c_with_ours",
+            "C with the shipping ECU",
+            &build_c_with_the_shipping_ecu()?,
+            &SAME_DRIVE,
+        ),
+        program(
+            "ours_light",
+            "ours with C's kind of ECU",
+            &ours,
+            &[["--ecu", "c"], once].concat(),
+        ),
         program("c", "C, gcc -O3 (law and protection alone)", &c, &SAME_DRIVE),
         program(
             "lanes",
@@ -194,11 +207,12 @@ fn programs() -> Result<Vec<Program>> {
             &lanes,
             &lanes_of("widest"),
         ),
+        program("c_native", "C, gcc -O3 -march=native", &c_native, &SAME_DRIVE),
         program(
-            "lanes_avx2",
-            "ours in lanes, with AVX2 at most",
-            &lanes,
-            &lanes_of("avx2"),
+            "ours_light_native",
+            "ours with C's kind of ECU, for this processor",
+            &ours_native,
+            &[["--ecu", "c"], once].concat(),
         ),
         program(
             "lanes_portable",
@@ -207,23 +221,10 @@ fn programs() -> Result<Vec<Program>> {
             &lanes_of("portable"),
         ),
         program(
-            "ours_light",
-            "ours with C's kind of ECU",
-            &ours,
-            &[["--ecu", "c"], once].concat(),
-        ),
-        program(
-            "ours_light_native",
-            "ours with C's kind of ECU, for this processor",
-            &ours_native,
-            &[["--ecu", "c"], once].concat(),
-        ),
-        program("c_native", "C, gcc -O3 -march=native", &c_native, &SAME_DRIVE),
-        program(
-            "c_with_ours",
-            "C with the shipping ECU",
-            &build_c_with_the_shipping_ecu()?,
-            &SAME_DRIVE,
+            "lanes_avx2",
+            "ours in lanes, with AVX2 at most",
+            &lanes,
+            &lanes_of("avx2"),
         ),
         program(
             "numba",
