@@ -1,6 +1,9 @@
 //! The page of keys of a board's flash, as files to write beside the image (`firmware/src/keys.rs`, `storage.rs` read it).
 //!
 //! The keys come by chance or from a file, and go into a file that its owner alone reads; no key is printed unless that is asked for.
+//!
+//! HEX and S19 are written by hand: the crates `ihex` and `srec` would save the sums of their records alone, and `bin_file`, which
+//! writes both, brings readers and regular expressions along.
 
 use std::fs;
 use std::io::Write;

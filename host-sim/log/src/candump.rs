@@ -1,6 +1,9 @@
 //! The text that `candump` writes: `(1700000000.123456) can0 0C0#0102030405060708` with `-L` or `-l`, and
 //! `(1700000000.123456)  can0  0C0   [8]  01 02 03 04 05 06 07 08` with `-ta`. Written is the first form.
 //!
+//! It is written by hand because the crate `socketcan`, which has a reader too, knows the form of `-L` alone, refuses codes of the
+//! length (`_9`), and builds on Linux alone, while this crate builds on every system and for a browser.
+//!
 //! Not here: what the frames mean.
 
 use std::io::{self, BufRead, Write};

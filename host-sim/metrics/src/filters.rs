@@ -4,6 +4,9 @@
 //! continued at both ends by its own odd reflection, and each pass starts in the steady state of its first
 //! value, so that a constant or a slope begins without a transient. The two passes square the filter's
 //! magnitude: half the amplitude at the cut-off.
+//!
+//! It is written by hand because no crate has all of it: `biquad` starts from rest and leaves reflection and the way back to its user,
+//! `sci-rs` has `sosfiltfilt` and no notch, and brings `ndarray` and a Kalman filter.
 
 use std::f64::consts::{PI, SQRT_2};
 

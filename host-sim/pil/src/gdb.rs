@@ -1,6 +1,9 @@
 //! The part of GDB's remote serial protocol that reads and writes a byte of a halted machine.
 //!
 //! A packet is `$text#cc`, `cc` the sum of the text's bytes; each is answered by `+`.
+//!
+//! It is written by hand because it needs three requests: the crates `gdbstub` and `gdb-protocol` are for the machine's side, and
+//! `gdbc` has the right side behind a terminal's whole interface.
 
 use std::io::{Error, Read, Result, Write};
 use std::net::TcpStream;
