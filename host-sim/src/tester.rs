@@ -148,6 +148,8 @@ fn others(ms: u32, torque: Torque) -> Vec<Frame> {
 }
 
 fn questions(ms: u32) -> [Frame; 3] {
+    // ISO-TP's length, then UDS: extended session; a challenge; codes by status; three identifiers; the snapshot of a code;
+    // clear all; the first frame of an answer to the challenge; every code that there may be.
     const QUESTIONS: [&[u8]; 8] = [
         &[2, 0x10, 3],
         &[2, 0x27, 1],

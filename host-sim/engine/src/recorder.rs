@@ -69,6 +69,7 @@ impl Recorder {
             } else {
                 angle
             });
+            // The new torque is decided in the step at `now`: until then the actuator holds the last one.
             log.guidance_torque_nm.push(last.guidance_torque_nm);
             log.driver_torque_nm.push(if self.rounded {
                 sensors::torque_nm(torque)

@@ -35,6 +35,7 @@ impl Checked {
     }
 
     fn has(self, number: u64) -> bool {
+        // The second condition holds for one run of each study, however short.
         seeds::nth(self.seed, number).is_multiple_of(CHECKED_OF) || number == self.seed % self.of
     }
 }

@@ -82,6 +82,7 @@ impl Confidence {
     /// digits.
     pub fn of_several(self, count: usize) -> Self {
         let outside = (1.0 - self.0) / count.max(1) as f64;
+        // Rounded up, so as to hold rather too often; 0.9999 is the largest level there is.
         Self((1e4 * (1.0 - outside)).ceil().min(9999.0) / 1e4)
     }
 
@@ -187,6 +188,7 @@ impl Mean {
     pub fn tukey(whole: f64, left: &[f64], level: Confidence) -> Self {
         let others = left.len() as f64 - 1.0;
         let pseudo: Vec<f64> = left.iter().map(|left| whole + others * (whole - left)).collect();
+        // The mean of the pseudo-values is corrected for bias; the interval lies about the figure that is shown.
         let centred = |[low, high]: [f64; 2]| {
             let half = 0.5 * (high - low);
             [whole - half, whole + half]
@@ -304,6 +306,7 @@ fn quantile(law: &ChiSquared, share: f64) -> f64 {
     while law.cdf(high) < share {
         high *= 2.0;
     }
+    // A hundred halvings are more than a float64 has digits.
     halved([low, high], 100, |x| law.cdf(x) < share)
 }
 

@@ -63,6 +63,7 @@ pub fn drive_forked<T>(
         let Some(outcome) = trunk.step(&Action::default()) else {
             break;
         };
+        // One step in five has a sample.
         samples.extend(outcome.sample);
     }
     (run_of(&trunk, samples), forked)
@@ -97,6 +98,7 @@ pub fn failures(scenario: &Scenario, faults: Faults) -> Vec<(u32, Failure)> {
     let of_kind = |kind, count: u32| {
         (0..count).map(move |place| {
             let step =
+                // The middles of equal parts: none lies at the very beginning.
                 ((f64::from(place) + 0.5) / f64::from(count) * span_s * f64::from(STEPS_PER_SECOND)) as u32;
             let time_s = f64::from(step) / f64::from(STEPS_PER_SECOND);
             let failure = Failure {

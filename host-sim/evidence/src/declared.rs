@@ -114,6 +114,7 @@ impl Listener {
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {
             if self.reported.mode == Mode::Active && guidance.mode != Mode::Active {
+                // What was named before took nothing away.
                 let named = guidance.faults.difference(self.faults);
                 self.reported.declarations.push(Declaration {
                     time_s,

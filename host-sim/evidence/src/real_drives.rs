@@ -385,5 +385,6 @@ fn by_chance(log: &DriveLog, options: &Options, fit: &Identification) -> Option<
             .optimum;
         found.is_some_and(|found| found >= k_hg)
     });
+    // The drive as it is counts as one of them: no share is zero.
     Some((1 + at_least.count()) as f64 / (1 + SHIFTS) as f64)
 }

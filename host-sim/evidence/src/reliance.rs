@@ -240,7 +240,9 @@ fn both_drives(
     let other = all[(place + 1 + (seed as usize * 3) % (count - 1)) % count]
         .guided
         .gains();
+    // 37 shares no divisor with 100, so a hundred seeds change at every second of the range.
     let time_s = 40.0 + f64::from(seed * 37 % 100);
+    // Noise that no steady drive of fewer than a thousand seeds has.
     let changing = scenario(plan, &all[place], seed + 1000)?
         .to_builder()
         .driver_change(Some(DriverChange {

@@ -94,6 +94,7 @@ const PLAIN: [(&str, &str); 4] = [
 ];
 
 fn car([m, i, l_f, l_r]: [f64; 4], [j_s, b_s, e_t, ratio, _]: [f64; 5]) -> VehicleParameters {
+    // Half an axle's, for the vehicle has it by tyre; an axle's load is by the distance of the other one.
     let stiffness = |other: f64| 0.5 * STIFFNESS_PER_LOAD * m * GRAVITY_M_PER_S2 * other / (l_f + l_r);
     VehicleParameters {
         m,

@@ -23,6 +23,7 @@ impl InputError {
     pub fn new(place: impl Display, message: impl Display) -> Self {
         Self {
             place: place.to_string(),
+            // The parser ends its messages with a line break.
             message: message.to_string().trim_end().to_string(),
         }
     }
@@ -69,6 +70,7 @@ pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) ->
 fn with_near(message: String) -> String {
     let near = ["unknown field `", "unknown variant `"].iter().find_map(|begin| {
         let (name, rest) = message.split_once(begin)?.1.split_once('`')?;
+        // The names that it expects stand between backticks, other words between these.
         let near = did_you_mean(name, rest.split('`').skip(1).step_by(2));
         (!near.is_empty()).then_some(near)
     });
@@ -91,6 +93,7 @@ const KINDS: [(&str, &str); 5] = [
 fn other_kind<T: DeserializeOwned>(text: &str) -> Option<String> {
     let fields: toml::Table = toml::from_str(text).ok()?;
     let (field, kind) = KINDS.iter().find(|(field, _)| fields.contains_key(*field))?;
+    // Only the parser knows which fields T has: it is asked with the field alone.
     let refusal = toml::from_str::<T>(&format!("{field} = 0")).err()?;
     refusal
         .message()

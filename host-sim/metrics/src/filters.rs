@@ -41,6 +41,7 @@ fn within(frequency_hz: f64, sample_rate_hz: f64) -> Option<f64> {
 
 fn forward_and_backward(filter: &Biquad, signal: &[f64]) -> Option<Vec<f64>> {
     let n = signal.len();
+    // The reflection takes so many samples beside the first or the last, which it does not repeat.
     if n <= REFLECTED {
         return None;
     }

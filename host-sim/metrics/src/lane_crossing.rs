@@ -67,6 +67,7 @@ fn smallest_positive_root(a: f64, b: f64, c: f64) -> f64 {
     }
     let q = -0.5 * (b + discriminant.sqrt().copysign(b));
     let positive = |t: f64| if t > 0.0 { t } else { f64::INFINITY };
+    // Where a or q is zero the quotient is infinite or no number: neither is the least positive root.
     positive(q / a).min(positive(c / q))
 }
 

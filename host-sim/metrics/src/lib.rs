@@ -278,7 +278,9 @@ fn percentile(values: &mut [f64], p: f64) -> Option<f64> {
     if share == 0.0 {
         return finite(low);
     }
+    // The next rank is the least of those above: they are not sorted.
     let high = above.iter().copied().fold(f64::INFINITY, f64::min);
+    // Between two that are infinite this is no number, which is no value either.
     finite(low + share * (high - low))
 }
 

@@ -3,7 +3,7 @@
 //! Markkula and Engstroem 2006 (also SAE J2944:2015). The wheel angle is low-passed, its turning points are
 //! found (the first sample counts as one), and a reversal is a rise from one turning point to a later one by
 //! more than the gap, counted from the lowest turning point since the last counted rise; falls likewise.
-//! The filter is in `butterworth`.
+//! The filter is in `filters`.
 
 /// Number of reversals larger than `gap` (same unit as the angle) in a filtered wheel angle.
 pub fn count_reversals(filtered_angle: &[f64], gap: f64) -> usize {

@@ -120,9 +120,11 @@ pub fn study(hours: f64, seed: u64, watch: &Watch<'_>) -> Result<Vec<Row>, Study
     }
     let seen = each(&segments, watch, |segment| drive(segment, seed))?;
     let mut rows = Vec::new();
+    // Each world has two roads.
     for (world, seen) in DRIVEN.into_iter().zip(seen.chunks(2 * count as usize)) {
         for (place, Limit(limit, _, level_nm, ..)) in LIMITS.iter().enumerate() {
             let of = || seen.iter().map(|seen| &seen[place]);
+            // So many frames of 10 ms are an hour.
             let hours = of().map(|seen| f64::from(seen.frames)).sum::<f64>() / 360_000.0;
             let faulted = of().filter(|seen| seen.faulted).count() as u64;
             rows.push(Row {

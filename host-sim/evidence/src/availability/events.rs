@@ -128,6 +128,7 @@ impl Eventful {
 
     /// Begins what happens so often in an hour, if it does now.
     fn begins(&mut self, step: u32, is_on: bool, per_hour: f64, busy: Span) -> bool {
+        // The draw comes last: what is switched off takes none from the others.
         is_on && step >= CALM_STEPS.max(busy.to) && self.rng.random::<f64>() < per_hour / STEPS_PER_HOUR
     }
 
@@ -150,6 +151,7 @@ impl Eventful {
             ..
         } = self.happens;
         if self.begins(step, blinks, BLINKS, self.blink) {
+            // A blink has no size, but a range must not be empty.
             self.blink = self.span(step, 40.0..800.0, 1.0..1.1);
         }
         if self.begins(step, slips, SLIPS, self.slip.span) {
@@ -173,6 +175,7 @@ impl Eventful {
             ..self.change
         };
         if self.begins(step, lane_changes, LANE_CHANGES, settled) {
+            // One lane; a range must not be empty.
             self.change = self.span(step, 5e3..8e3, LANE_M..LANE_M + 1e-9);
             self.before_m = self.after_m;
             self.after_m = if self.before_m == 0.0 {

@@ -57,6 +57,7 @@ pub struct AvailabilityPlan {
 impl AvailabilityPlan {
     /// Every segment, in order.
     fn segments(&self) -> Vec<SegmentNumber> {
+        // Rounding must not begin one more segment.
         let segments = (self.hours * 3600.0 / SEGMENT_S - 1e-9).ceil().max(1.0) as u32;
         let numbers = if self.only.is_empty() {
             (0..segments).collect()

@@ -108,15 +108,18 @@ impl SegmentNumber {
         });
         let seed = Stream::Population
             .seed(root)
+            // The number has the lower 32 bits, so that roads share no seed.
             .wrapping_add(named << 32)
             .wrapping_add((*number).into());
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        // A new draw goes behind all of these: each moves those that follow it, and so every published figure.
         let speed_kmh: f64 = rng.random_range(road.speed_kmh[0]..road.speed_kmh[1]);
         let driver = LaneKeeper::draw(&mut rng, road.remnant_sd_nm);
         // Noise of its own; 53 bits, so that any reader of JSON keeps it.
         let noise = rng.random::<u64>() >> 11;
         let lateral = world.lateral_m_per_s2().unwrap_or(road.lateral_m_per_s2);
         let course = road.course(speed_kmh / 3.6, lateral, world.surface(), &mut rng);
+        // The same cars on every road and in every world.
         let car = (root << 16).wrapping_add((number % CARS).into());
         let speed = if world.changes_speed() {
             falling_and_rising(speed_kmh, &mut rng)

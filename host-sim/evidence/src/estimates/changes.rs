@@ -86,6 +86,7 @@ pub fn changes(
     }
     let jobs = guided(plan, drives)?;
     let found = each(&jobs, watch, |&(number, published, drive)| {
+        // Each participant has each kind in turn.
         let place = (drive as usize + number as usize) % kinds.len();
         let (name, kind) = kinds[place];
         let plan = plan.repetition(drive);

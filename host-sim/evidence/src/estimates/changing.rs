@@ -88,6 +88,7 @@ pub(super) fn driven_changing(
         let time_s = STEP_S * f64::from(step);
         let due = changes.iter().any(|change| {
             let since = (change.at_s / STEP_S) as u32;
+            // An interval more than it lasts, so that a drift reaches its last value.
             let until = since + (change.over_s / STEP_S) as u32 + DRIFT_STEPS;
             (since..=until).contains(&step) && (step - since).is_multiple_of(DRIFT_STEPS)
         });

@@ -165,6 +165,7 @@ fn corrupt(log: &mut DriveLog, way: Corruption, random: &mut Xoshiro256PlusPlus)
         Corruption::HandsOff(s) => {
             let k = random.random_range(MARGIN..n - MARGIN - rows(s));
             for x in &mut log.driver_torque_nm[k..k + (s / log.dt_s) as usize] {
+                // A step of the torque sensor down, none, or one up.
                 *x = 0.005 * f64::from(random.random_range(-1..2));
             }
         }

@@ -242,6 +242,7 @@ impl CorruptionLine {
             coverage: intervals.iter().fold(Held::default(), |sum, h| sum + *h).share(),
             intervals,
             rms,
+            // K_hg is the last of the five.
             k_hg_read: found
                 .iter()
                 .filter(|f| f.0[4].1.estimate.is_some_and(|x| (x - f.0[4].2).abs() < 0.05))
@@ -297,6 +298,7 @@ impl Corruptions {
         );
         let line = |name: &str| lines.iter().find(|l| l.corrupted_by == name);
         if let (Some(clean), Some(noisy)) = (line("clean"), line("lane noise 10 mm, 1 mrad")) {
+            // Thirteen of the fourteen participants.
             if noisy.k_hg_read * 14 < 13 * noisy.drives {
                 broken.push(format!(
                     "lane noise 10 mm: K_hg read in {} of {}",

@@ -131,6 +131,7 @@ impl Kind {
             Self::TenSteps => {
                 let other = away(0.5).clamp(0.0, 1.0);
                 goes.extend((0..10).map(|i| (Changed::KHg, if i % 2 == 0 { other } else { k_hg })));
+                // Ten steps 18 s apart: the last is 18 s before the end.
                 at_s = 18.0;
             }
             Self::Constant | Self::Authority | Self::TorqueScale | Self::TorqueOffset | Self::LaneOffset => {}

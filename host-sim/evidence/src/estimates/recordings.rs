@@ -366,6 +366,7 @@ impl Channel {
                 text,
                 "{:.4},True,{speed:.4},0,{:.5},{:.7},{:.7},{torque:.2},{angle},{left:.4},{right:.4},{:.5},0",
                 now.time_s,
+                // The layout takes it for a share of 3 N.m.
                 now.guidance_torque_nm / 3.0,
                 -now.curvature_1pm,
                 -now.yaw_rate_rad_per_s / speed,

@@ -124,6 +124,7 @@ impl DriveResult {
 /// The information bound of a guided drive: gain_1, gain_2, gain_3, t_p and K_hg, with t_nms known.
 pub(super) fn bound_of(log: &DriveLog, truth: &PublishedDriver) -> [f64; COMPARED] {
     let least = information(log, &Options::default(), &truth_of(truth));
+    // The bound has K_hg before t_p, and t_nms last; what is compared has t_p before K_hg.
     let [gain_1, gain_2, gain_3, k_hg, t_p, _] = least.standard_errors(true);
     [gain_1, gain_2, gain_3, t_p, k_hg]
 }

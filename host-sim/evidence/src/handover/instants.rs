@@ -67,6 +67,7 @@ fn instants_of_driver(drives: &[Drive], peaks: &[Peaks], found: &mut Vec<Instant
     for (drive, own) in drives.iter().zip(peaks).skip(1) {
         match drive.failure.kind {
             FailureKind::None => nominal = *own,
+            // KINDS has the input first, so this is the handover of the same instant as the drop behind it.
             FailureKind::Input => handed = *own,
             FailureKind::Torque => {
                 let of_instant = [nominal, handed, *own];

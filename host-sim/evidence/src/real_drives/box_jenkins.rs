@@ -85,6 +85,7 @@ fn squares(model: &BoxJenkins, series: &[&Series]) -> Quadratic {
         let mut error = 0.0;
         let mut slope = DVector::zeros(size);
         for k in ORDER..n.len() {
+            // The error before holds the parameters too: its slope goes on, by -c.
             slope *= -c;
             let [x, last, before] = [0, 1, 2].map(|lag| &series[k - lag].0);
             for i in 0..inputs {
@@ -96,6 +97,7 @@ fn squares(model: &BoxJenkins, series: &[&Series]) -> Quadratic {
             error = n[k] - d_1 * n[k - 1] - d_2 * n[k - 2] - c * error;
             loss += error * error;
             gradient.axpy(2.0 * error, &slope, 1.0);
+            // Gauss and Newton's: the curvature of the errors themselves is left out.
             hessian.ger(2.0, &slope, &slope, 1.0);
         }
     }

@@ -161,6 +161,7 @@ impl Senders<'_> {
 /// Feeds a recording to an ECU that guides from the start on and is asked again 5 s after each end.
 pub(super) fn fed(rows: &Rows, feed: Feed, file: &str) -> Fed {
     let setup = Setup {
+        // The recorded torque is not that of our law, and the monitor would refuse it.
         monitor: Setup::PAPER.monitor.with_another_law(),
         ..Setup::PAPER
     };
@@ -196,6 +197,7 @@ pub(super) fn fed(rows: &Rows, feed: Feed, file: &str) -> Fed {
             let limit = listener.said.map(|said| said.limit);
             overridden += u32::from(limit == Some(LimitReason::DriverOverride));
         }
+        // A declaration of this step gets the row of now.
         at_rows.resize(listener.reported.declarations.len(), senders.row);
     }
     let hours = |steps: u32| f64::from(steps) / 3.6e6;

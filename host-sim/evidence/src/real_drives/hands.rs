@@ -54,7 +54,9 @@ impl Felt {
                 let mut is_felt = vec![false; whole + 1];
                 let (mut hands, mut last_s) = (HandsState::NEW, time_s[0]);
                 for (k, torque) in driver_nm.iter().enumerate() {
+                    // Whether the time goes back to zero is all that is asked, so one microsecond does.
                     hands.add_guided_time(ACTS, Micros::from_us(1));
+                    // The ECU's thresholds are constants: a smaller torque stands for a larger threshold.
                     hands.update(Torque::from_nm(torque / factor(threshold)), Torque::ZERO);
                     if part == 1 && threshold == OWN {
                         found.longest_s = found.longest_s.max(time_s[k] - last_s);

@@ -58,6 +58,7 @@ impl Rows {
         let rate = |k: usize| measured(k).unwrap_or(driven_1pm[k] * speed_m_per_s[k]);
         let yaw_rate_rad_per_s: Vec<f64> = (0..time_s.len()).map(rate).collect();
         let [near, far] = POINTS_S.map(|ahead_s| turned(&time_s, &yaw_rate_rad_per_s, ahead_s));
+        // On an arc the way goes aside by half of what its direction turns.
         let lateral = |(near, v): (f64, &f64)| 0.5 * POINTS_S[0] * v * near;
         let level = vec![0.0; time_s.len()];
         Some(Self {

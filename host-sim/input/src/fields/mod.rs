@@ -50,6 +50,7 @@ pub struct Field {
 impl Field {
     /// The one of a list that has a name; a name that none has does not compile.
     pub const fn named(list: &'static [Self], name: &str) -> &'static Self {
+        // By hand, as no constant function can compare strings or loop with `for`.
         let mut i = 0;
         while i < list.len() {
             let (one, other) = (list[i].name.as_bytes(), name.as_bytes());
@@ -215,6 +216,7 @@ macro_rules! fields {
 
         impl $crate::fields::Fields for $Struct {
             const TABLE: &'static str = $table;
+            // Which word it is does not matter, only that one is there.
             $(const COMPLETE: bool = stringify!($complete).len() > 0;)?
 
             fn fields() -> Vec<&'static $crate::fields::Field> {

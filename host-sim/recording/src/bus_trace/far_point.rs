@@ -100,6 +100,7 @@ fn direction(wheel_angle_rad: &[f64], vehicle: &SingleTrack, speed_m_per_s: &[f6
         x[4] = (next - angle) / dt_s;
         angle = next;
         x = known.1 * x;
+        // Where the vehicle moves to: its heading and the angle at which it slips sideways.
         out.push(x[2] + (x[0] / v[1]).atan());
     }
     out
@@ -118,6 +119,7 @@ fn rates(vehicle: &SingleTrack, v: f64) -> SMatrix<f64, 5, 5> {
     } = *vehicle;
     let moment = l_f * k_f - l_r * k_r;
     let mut a = SMatrix::<f64, 5, 5>::zeros();
+    // Stiffnesses count twice: an axle has two tyres.
     a[(0, 0)] = -2.0 * (k_f + k_r) / (m * v);
     a[(0, 1)] = -v - 2.0 * moment / (m * v);
     a[(0, 3)] = 2.0 * k_f * k_t / m;

@@ -135,6 +135,7 @@ impl<'a> Heard<'a> {
                 AGE => continue,
                 E_Y | E_THETA => {
                     time_s -= age_s;
+                    // A picture that comes again, or out of turn, tells nothing new.
                     if !is_valid || time_s <= needed.last_s {
                         continue;
                     }

@@ -174,6 +174,7 @@ fn read_trace(bus: &BusLog, how: &Recording<'_>) -> Result<DriveLog, LogError> {
     let trace = Trace {
         bus,
         dbc: &dbc,
+        // The torque of the guidance is the last one, here and on the grid.
         needed: &NEEDED[..if how.manual { 7 } else { 8 }],
     };
     let (mut survey, heard, read) = trace.survey(&ALWAYS)?;

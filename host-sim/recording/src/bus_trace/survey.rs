@@ -72,6 +72,7 @@ impl Survey {
     pub(super) fn take(&mut self, value: &Value) {
         let time_s = value.time_s;
         self.courses[value.signal].take(value);
+        // The speed is held where the others pause, and must not fill their gap.
         if value.signal == SPEED {
             return;
         }

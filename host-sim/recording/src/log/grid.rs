@@ -61,6 +61,7 @@ impl Grid {
         }
         let longest = time.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let all: Vec<usize> = (0..time.len()).collect();
+        // A lost row makes a step of two.
         if longest <= 1.5 * usual
             && let Some((start_s, dt_s)) = fits(time, &all)
         {
@@ -129,6 +130,7 @@ impl Grid {
         Ok(Self {
             start_s,
             dt_s,
+            // Rounding must not push the last stamp off the grid.
             rows: ((time[time.len() - 1] - start_s) / dt_s + 1e-9) as usize + 1,
             place: Place::Between(LONGEST_STEP * usual),
             finding: Some(finding),

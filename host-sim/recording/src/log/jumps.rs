@@ -27,6 +27,7 @@ pub(crate) fn jump(gaps: impl Iterator<Item = Jump> + Clone, step_s: f64) -> Opt
     let length_s = |gap: &Jump| gap.after_s - gap.before_s;
     let empty: f64 = gaps
         .clone()
+        // Up to a step and a half it is no gap, as on the grid.
         .map(|gap| (length_s(&gap) / step_s - 1.5).max(0.0))
         .sum();
     if empty <= MOST_EMPTY_ROWS {
@@ -77,6 +78,7 @@ pub(super) fn usable(
         before_s: time_s[row],
         after_s: time_s[row + 1],
     };
+    // A gap lies behind each row but the last; of no rows there is none.
     while let Some(jump) = jump((rows.start..rows.end.max(1) - 1).map(gap), step_s) {
         let next = jump.row + 1;
         if jump.use_after(&lines.place(next), 0.0, stretches)? {

@@ -264,6 +264,7 @@ impl DriveLog {
             .resampling
             .iter()
             .copied()
+            // The first lag is 1: lag `every` is the first between rows that are kept.
             .skip(every - 1)
             .step_by(every)
             .collect();
@@ -385,6 +386,7 @@ impl DriveLog {
             grid.put(&time, column, c)
         });
         if manual {
+            // The time is no signal, so places are one less than in COLUMNS.
             for x in signals[GUIDANCE_COLUMN - 1].iter_mut().filter(|x| x.is_nan()) {
                 *x = 0.0;
             }

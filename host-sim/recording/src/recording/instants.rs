@@ -2,6 +2,7 @@
 
 use super::{Column, DRIVER, GUIDANCE, LogError, Values, refuse};
 
+// Places of e_y and e_theta in COLUMNS.
 const LANE: [usize; 2] = [1, 2];
 /// A lane signal whose usual step is so many of the driver torque's is slower.
 const SLOWER: f64 = 1.5;

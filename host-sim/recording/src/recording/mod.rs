@@ -224,6 +224,7 @@ fn of_channels(
     let manual = how.manual;
     let (mut notes, mut missing) = (Vec::new(), Vec::new());
     let mut columns: [Option<Column<'_>>; 6] = Default::default();
+    // The time is the group's own, found by the reader.
     for (i, column) in columns.iter_mut().enumerate().skip(1) {
         let map = maps.iter().find(|map| map.column == i);
         let (group, series) = match recording.find(map.map_or(NAMES[i], |map| &map.term.channel)) {

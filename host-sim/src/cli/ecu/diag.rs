@@ -198,6 +198,7 @@ fn key(write: &Write) -> Result<Key, InputError> {
 
 /// A code as workshops write it: C1111.
 fn code(trouble: u32) -> String {
+    // The upper two bits of three bytes are the letter, the next 14 the digits; the last byte is no part of the name.
     let letter = ["P", "C", "B", "U"][(trouble >> 22 & 3) as usize];
     format!("{letter}{:04X}", trouble >> 8 & 0x3FFF)
 }
