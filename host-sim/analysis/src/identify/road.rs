@@ -5,8 +5,7 @@
 //! the turn of one second in bends. The near point, 0.3 s ahead, is 0.7 s behind: a lag of [`SMOOTH_S`] is a part of that, and
 //! takes the noise out. The car's own weaving cancels, so this is the road's and nobody's answer.
 
-use super::signals::integral;
-use super::wide::lagged;
+use super::wide::{integral, lagged};
 use haptic_recording::DriveLog;
 
 /// How far ahead the far and the near point are, s.

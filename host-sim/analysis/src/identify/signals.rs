@@ -17,7 +17,7 @@
 
 use super::road::road;
 use super::switches::Switches;
-use super::wide::{BLOCK, window};
+use super::wide::{BLOCK, integral, window};
 use haptic_recording::DriveLog;
 
 /// The muscle of equation (8), taken as known (table 4).
@@ -269,17 +269,6 @@ fn lines(u: &[f64]) -> Vec<f64> {
         *corner -= (w[0] - 2.0 * w[1] + w[2]) / 12.0;
     }
     out
-}
-
-/// Running integral by the trapezoidal rule, from zero.
-pub(crate) fn integral(u: &[f64], dt_s: f64) -> Vec<f64> {
-    let mut sum = 0.0;
-    std::iter::once(0.0)
-        .chain(u.windows(2).map(|w| {
-            sum += 0.5 * dt_s * (w[0] + w[1]);
-            sum
-        }))
-        .collect()
 }
 
 #[cfg(test)]

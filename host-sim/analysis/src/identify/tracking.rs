@@ -15,8 +15,8 @@
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
-use super::noise_model::{self, BEND_RAD_S, LONGEST_DELAY_S};
-use super::options::Options;
+use super::noise_model::{self, LONGEST_DELAY_S};
+use super::options::{BEND_RAD_S, Options};
 use super::prepare::{Prepared, prepare};
 use super::result::Identification;
 use super::signals::{LagWeights, Signals};

@@ -54,6 +54,17 @@ pub(crate) fn lagged(u: &[f64], dt_s: f64, lag_s: f64) -> Vec<f64> {
         .collect()
 }
 
+/// Running integral by the trapezoidal rule, from zero.
+pub(crate) fn integral(u: &[f64], dt_s: f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    std::iter::once(0.0)
+        .chain(u.windows(2).map(|w| {
+            sum += 0.5 * dt_s * (w[0] + w[1]);
+            sum
+        }))
+        .collect()
+}
+
 /// The mean of each row of `u` and so many to both sides, as far as there are any.
 pub(crate) fn running_mean(u: &[f64], half: usize) -> Vec<f64> {
     let mut sums = vec![0.0];

@@ -91,7 +91,7 @@ fn answers(wheel_angle: &[f64], dt: f64, integrals: usize) -> Vec<Vec<f64>> {
         .collect();
     let mut whole = wheel_angle.to_vec();
     for _ in 0..integrals {
-        whole = super::signals::integral(&whole, dt);
+        whole = super::wide::integral(&whole, dt);
         out.push(whole.clone());
     }
     out

@@ -21,9 +21,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::change_score::{BLOCK_S, Block, Fitted, Freed, LOCAL, Local, OFFSET, most};
-use super::delays::Line;
 use super::sums::Rows;
-use super::{K_HG, LONGEST_DELAY_S, OWN_OFFSET, Problem, T_P};
+use super::{K_HG, LONGEST_DELAY_S, Line, OWN_OFFSET, Problem, T_P};
 use crate::identify::balance::{Balance, balance};
 use crate::identify::change::{Change, Constancy, E_Y, T_D};
 use crate::identify::result::Refutation;

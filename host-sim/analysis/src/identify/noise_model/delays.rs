@@ -7,21 +7,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::sums::Products;
-use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, OWN_BEND, OWN_OFFSET, Problem, RHO, T_P, THETA, at};
+use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, Line, OWN_BEND, OWN_OFFSET, Problem, RHO, T_P, THETA, at};
 use crate::identify::search::Quadratic;
 use crate::identify::signals::{Delay, Lagged};
 use crate::identify::wide::BLOCK;
 
 /// A remainder of the filter's start below this is none.
 const NOTHING: f64 = 1e-30;
-
-/// What the derivatives by the driver's own line are: by the torques that it makes, a slope and one in proportion to the road's
-/// heading, in which no gain has a part; or by its size, with the gains as they are.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Line {
-    Torques,
-    Size,
-}
 
 /// A point of the search whose delay varies.
 pub(super) struct Delays<'a> {

@@ -11,8 +11,7 @@ use super::evidence::Alternative;
 use super::sums::Rows;
 use super::{COUNT, D_LATE, Problem, RHO, T_NMS, T_P, THETA};
 use crate::identify::lane::LaneDoubt;
-use crate::identify::signals::integral;
-use crate::identify::wide::dot;
+use crate::identify::wide::{dot, integral};
 
 /// What the doubts of the lane signals do to the estimates.
 pub(super) struct Doubted {

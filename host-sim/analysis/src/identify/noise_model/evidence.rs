@@ -3,10 +3,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::delays::{Delays, Line};
+use super::delays::Delays;
 use super::sums::Rows;
 use super::{
-    COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, OWN_BEND, OWN_OFFSET, Problem,
+    COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, Line, OWN_BEND, OWN_OFFSET, Problem,
     SOUGHT_KG_M2, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S, T_P, VARIATION_WIDTHS, WHEEL,
 };
 use crate::identify::result::{Parameter, STANDARD_NORMAL_95};

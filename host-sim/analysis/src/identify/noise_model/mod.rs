@@ -40,10 +40,10 @@ mod uncertainty;
 
 use std::ops::Range;
 
-use delays::{Delays, Line};
+use delays::Delays;
 pub use information::{INFORMED, Information, Truth, information};
 
-use super::options::{Inertia, Options};
+use super::options::{BEND_RAD_S, Inertia, Options};
 use super::prepare::{Prepared, prepare};
 use super::result::{Identification, SAME_LINE, Start};
 use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
@@ -54,6 +54,14 @@ use haptic_recording::DriveLog;
 
 /// Longest delay that is searched, s: twice table 4's, to hold the paper's inattentive driver (0.5 s).
 pub const LONGEST_DELAY_S: f64 = 0.6;
+
+/// What the derivatives by the driver's own line are: by the torques that it makes, a slope and one in proportion to the road's
+/// heading, in which no gain has a part; or by its size, with the gains as they are.
+#[derive(Clone, Copy, PartialEq)]
+enum Line {
+    Torques,
+    Size,
+}
 
 /// Places in the parameter vector; 0, 1, 2 are `gain_i`.
 const K_HG: usize = 3;
@@ -117,8 +125,6 @@ const VARIATION_WIDTHS: [f64; COUNT] = [
     0.05,
 ];
 
-/// The turn of the road in a bend of 300 m at 60 km/h, rad/s: what a line in bends is judged by.
-pub(crate) const BEND_RAD_S: f64 = 60.0 / 3.6 / 300.0;
 /// What is known of a driver's own line where the record does not show one, m: its standard deviation about the target line on a
 /// straight road, and that of its part in a bend.
 const LINE_SD_M: f64 = 0.05;

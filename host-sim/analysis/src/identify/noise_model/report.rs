@@ -10,12 +10,12 @@ use super::delays::filter;
 use super::sums::Rows;
 use super::uncertainty::{ActiveBounds, Uncertainty};
 use super::{
-    BEND_RAD_S, COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P,
-    THETA, VARIATION_WIDTHS,
+    COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P, THETA,
+    VARIATION_WIDTHS,
 };
 use crate::identify::balance::balance;
 use crate::identify::diagnostics;
-use crate::identify::options::{FixError, Options};
+use crate::identify::options::{BEND_RAD_S, FixError, Options};
 use crate::identify::paper::TABLE_4;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::{

@@ -7,10 +7,9 @@
 
 use std::ops::Range;
 
-use super::delays::Line;
 use super::{
-    CORE, COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P, THETA,
-    WHEEL, at,
+    CORE, COUNT, D_LATE, DAMPING, H_LATE, K_HG, K_NMS, Line, OWN_BEND, OWN_OFFSET, Problem, RHO, T_NMS, T_P,
+    THETA, WHEEL, at,
 };
 use crate::identify::signals::Delay;
 use crate::identify::wide::BLOCK;

@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::delays::Line;
-use super::{CORE, COUNT, DRIVER, LINEAR, Problem, RHO, SMALLEST_ERROR_NM, THETA};
+use super::{CORE, COUNT, DRIVER, LINEAR, Line, Problem, RHO, SMALLEST_ERROR_NM, THETA};
 use crate::identify::search::Quadratic;
 use crate::identify::wide::{BLOCK, add_products_of_columns};
 

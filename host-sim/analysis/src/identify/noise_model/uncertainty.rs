@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::delays::Line;
 use super::evidence::{Alternative, Told};
 use super::sums::Rows;
 use super::{
-    COUNT, DRIVER, K_HG, K_NMS, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS, WHEEL,
+    COUNT, DRIVER, K_HG, K_NMS, Line, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA, VARIATION_WIDTHS,
+    WHEEL,
 };
 use crate::identify::change::Constancy;
 use crate::identify::prepare::Prepared;
