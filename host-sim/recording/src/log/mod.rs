@@ -15,16 +15,10 @@ mod tests;
 mod write;
 
 use std::fmt;
-use std::fs::File;
-use std::io::{BufReader, Read};
-use std::path::Path;
 
 use grid::{Grid, usual_step};
 pub use grid::{SWITCH_RATE_NM_S, median};
 use haptic_log::recording::{Lines, RecordingError};
-
-use super::bus_trace;
-use super::recording::of_csv;
 
 /// Names of the columns that a log must have, in the order of the fields of [`DriveLog`].
 pub const COLUMNS: [&str; 6] = [
@@ -189,39 +183,6 @@ impl DriveLog {
             &self.guidance_torque_nm,
             &self.driver_torque_nm,
         ]
-    }
-
-    /// Reads and checks the file at `path`. Lines that begin with `#` are skipped; upper and lower case are one in
-    /// the header. Of a `manual` drive the guidance may be missing, as a column or as a number: it is then zero.
-    ///
-    /// # Errors
-    /// The file cannot be read, or what it holds is refused; the text begins with the path.
-    pub fn open(path: &Path, manual: bool) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
-        Self::read(BufReader::new(file), manual).map_err(|e| LogError::in_file(path.display(), e))
-    }
-
-    /// Reads and checks a log from `source`; see [`DriveLog::open`].
-    ///
-    /// # Errors
-    /// A missing or doubled column, a field that is neither a number nor empty, a value beyond its column's range, time
-    /// stamps that run backwards or repeat, or a record that is too short.
-    pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
-        Self::read_within(source, manual, &[])
-    }
-
-    /// Reads and checks a log of which these stretches of the log's time, s, will be used: of a log whose clock was set, the side of the jump
-    /// that they lie on is read.
-    ///
-    /// # Errors
-    /// As [`DriveLog::read`].
-    pub fn read_within(source: impl Read, manual: bool, stretches: &[(f64, f64)]) -> Result<Self, LogError> {
-        let how = bus_trace::Recording {
-            manual,
-            stretches,
-            ..bus_trace::Recording::default()
-        };
-        Ok(of_csv(source, &[], &how)?.0)
     }
 
     /// Every so many-th row, where there are more than a fit gains from: the least that leaves `MOST_ROWS`, but not so many

@@ -11,7 +11,8 @@ mod layout;
 mod mapping;
 mod speed;
 
-use std::io::Read;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use haptic_log::candump;
@@ -51,7 +52,7 @@ pub fn open(
     let named = |e: LogError| LogError::in_file(path.display(), e);
     let format = Format::if_named(path)?;
     let mut head = Vec::new();
-    let opened = std::fs::File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    let opened = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
     opened.map_err(|e| LogError::in_file(path.display(), e))?;
     if let Some(format) = bus_format(format, &head).filter(|_| layout.is_none()) {
         let watch = how.watch.cloned().unwrap_or_default();
@@ -63,7 +64,7 @@ pub fn open(
     }
     if layout.is_none() && matches!(format, None | Some(Format::Csv | Format::Candump)) {
         // As it comes: a table of many hours fills a memory.
-        let file = std::fs::File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
+        let file = File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
         let watch = how.watch.cloned().unwrap_or_default();
         let read = once(maps).and_then(|()| of_csv(watch.over(file), maps, how));
         return read.map_err(named);
@@ -127,7 +128,7 @@ pub fn of_bytes(
 }
 
 /// A log of a CSV file's text, of which only the columns that are needed are kept.
-pub(super) fn of_csv(
+fn of_csv(
     source: impl Read,
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
@@ -148,6 +149,41 @@ fn of_contents(
     match contents {
         Contents::Frames(log) => of_bus(log, maps, how),
         Contents::Channels(recording) => of_channels(recording, maps, how),
+    }
+}
+
+impl DriveLog {
+    /// Reads and checks the file at `path`. Lines that begin with `#` are skipped; upper and lower case are one in
+    /// the header. Of a `manual` drive the guidance may be missing, as a column or as a number: it is then zero.
+    ///
+    /// # Errors
+    /// The file cannot be read, or what it holds is refused; the text begins with the path.
+    pub fn open(path: &Path, manual: bool) -> Result<Self, LogError> {
+        let file = File::open(path).map_err(|e| LogError::in_file(path.display(), e))?;
+        Self::read(BufReader::new(file), manual).map_err(|e| LogError::in_file(path.display(), e))
+    }
+
+    /// Reads and checks a log from `source`; see [`DriveLog::open`].
+    ///
+    /// # Errors
+    /// A missing or doubled column, a field that is neither a number nor empty, a value beyond its column's range, time
+    /// stamps that run backwards or repeat, or a record that is too short.
+    pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
+        Self::read_within(source, manual, &[])
+    }
+
+    /// Reads and checks a log of which these stretches of the log's time, s, will be used: of a log whose clock was set, the side of the jump
+    /// that they lie on is read.
+    ///
+    /// # Errors
+    /// As [`DriveLog::read`].
+    pub fn read_within(source: impl Read, manual: bool, stretches: &[(f64, f64)]) -> Result<Self, LogError> {
+        let how = bus_trace::Recording {
+            manual,
+            stretches,
+            ..bus_trace::Recording::default()
+        };
+        Ok(of_csv(source, &[], &how)?.0)
     }
 }
 
