@@ -72,6 +72,7 @@ const APART: [&str; 4] = ["controller", "law", "safety", "service"];
 /// another module that is none of these.
 #[rustfmt::skip]
 const STUDIES: Arrows = &[
+    ("host-sim/column/src/study", &["assist", "hands", "reading", "sensors"]),
     ("host-sim/batch/src", &["adaptation", "bus_load", "compare", "course", "design", "design_guidance", "evaluate", "experiment", "identify", "run", "stability", "study", "sweep"]),
     ("host-sim/evidence/src", &["availability", "estimates", "handover", "real_drives", "reliance", "vehicle"]),
 ];
@@ -97,7 +98,7 @@ const PACKAGES: Arrows = &[
     ("host-sim/input", &["haptic-core"]),
     ("host-sim/road", &["haptic-input"]),
     ("host-sim/sim", &["haptic-core", "haptic-input", "haptic-log", "haptic-road"]),
-    ("host-sim/column", &["haptic-core", "haptic-sim"]),
+    ("host-sim/column", &["haptic-core", "haptic-engine", "haptic-sim"]),
     ("host-sim/vectorised", &["haptic-core", "haptic-log", "haptic-sim"]),
     ("host-sim/metrics", &["haptic-log"]),
     ("host-sim/vehicle", &["haptic-log"]),
@@ -261,28 +262,36 @@ fn part(path: &[String], modules: &BTreeSet<Vec<String>>) -> Option<String> {
     module.or(known(1)).map(|head| head.join("::"))
 }
 
-/// Every arrow between the parts of a crate, without unit tests.
-fn arrows(src: &str) -> BTreeMap<String, BTreeSet<String>> {
+/// What every module of a crate but its root names of the crate, as paths from the root, without unit tests.
+fn named(src: &str) -> BTreeMap<Vec<String>, BTreeSet<Vec<String>>> {
     let src = root().join(src);
-    let all = sources(&src);
-    let module = |path: &Path| {
+    let mut named = BTreeMap::new();
+    for path in sources(&src) {
         let below = path.strip_prefix(&src).unwrap().with_extension("");
         let parts = below.iter().map(|part| part.to_str().unwrap().to_owned());
-        parts.filter(|part| part != "mod").collect::<Vec<_>>()
-    };
-    let modules: BTreeSet<_> = all.iter().map(|path| module(path)).collect();
-    let mut arrows: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for path in &all {
-        let place = module(path);
-        if ["lib", "main"].contains(&place[0].as_str()) || path.ends_with("tests.rs") {
+        let place: Vec<_> = parts.filter(|part| part != "mod").collect();
+        let is_root = place
+            .first()
+            .is_none_or(|room| ["lib", "main"].contains(&room.as_str()));
+        if is_root || path.ends_with("tests.rs") {
             continue;
         }
-        let from = part(&place, &modules).unwrap();
         let text = std::fs::read_to_string(path).unwrap();
         // A module of tests in another file ends nothing.
         let text = text.replace("#[cfg(test)]\nmod tests;", "");
         let (product, _) = text.split_once("#[cfg(test)]").unwrap_or((&text, ""));
-        let used = uses(product, &place);
+        named.insert(place.clone(), uses(product, &place));
+    }
+    named
+}
+
+/// Every arrow between the parts of a crate, without unit tests.
+fn arrows(src: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let named = named(src);
+    let modules: BTreeSet<_> = named.keys().cloned().collect();
+    let mut arrows: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (place, used) in &named {
+        let from = part(place, &modules).unwrap();
         let used = used.iter().filter_map(|path| part(path, &modules));
         let used = used.filter(|to| *to != from);
         arrows.entry(from.clone()).or_default().extend(used);

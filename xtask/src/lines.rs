@@ -25,7 +25,7 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("host-sim/analysis", 7_420),
     ("host-sim/batch", 8_830),
     ("host-sim/campaign", 4_150),
-    ("host-sim/column", 1_630),
+    ("host-sim/column", 1_660),
     ("host-sim/engine", 1_280),
     ("host-sim/evidence", 7_730),
     ("host-sim/input", 370),

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_batch::StudyError;
-use haptic_batch::engine::each;
+use haptic_batch::engine::Study;
 use haptic_column::study::{ColumnFile, assist, hands, reading, sensors};
 use haptic_report::studies::torsion_bar::{assist_report, hands_report, reading_report, sensors_report};
+use haptic_sim::Scenario;
 use haptic_sim::input::in_range;
 
 use super::progress::Threads;
-use super::results::ResultArguments;
+use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, in_file, progress};
 
 /// Which column.
@@ -55,6 +56,8 @@ pub(super) struct SensorArguments {
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
+    level: LevelArgument,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
@@ -63,13 +66,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         file: arguments.column.load()?,
     };
     let output = arguments.results.begin("assist")?;
-    let cases = study.cases();
-    let drive = |case: &assist::Case| study.drive(case).map_err(|e| StudyError::from(e.to_string()));
-    let driven = progress::watched("drivers", |watch| {
-        arguments.threads.run(|| each(&cases, watch, drive))
-    })??;
-    let results = study.summarise(&cases, &driven)?;
+    let results = driven(&study, "drivers", &arguments.threads)?;
     output.show(&assist_report(&results), &results, true)
+}
+
+/// What a study finds, on so many threads.
+fn driven<S: Study<Results: Send>>(study: &S, unit: &str, threads: &Threads) -> Result<S::Results, BadInput> {
+    Ok(progress::watched(unit, |watch| {
+        threads.run(|| study.run(watch))
+    })??)
+}
+
+/// The ECU's last reading of K_hg.
+fn read(scenario: Scenario) -> Result<reading::Reading, StudyError> {
+    let read = haptic_batch::run::run(scenario, false)?.results.k_hg;
+    Ok(read.map(|read| [read.k_hg, read.deviation]))
 }
 
 pub(super) fn sensors(arguments: &SensorArguments) -> Result<Outcome, BadInput> {
@@ -77,29 +88,12 @@ pub(super) fn sensors(arguments: &SensorArguments) -> Result<Outcome, BadInput> 
     let output = arguments.results.begin("driver-torque")?;
     if let Some(hours) = arguments.hands {
         in_range("--hands", hours, 0.05..=100.0, "h")?;
-        let study = hands::Study { file, hours };
-        let cases = study.cases();
-        let drive = |case: &hands::Case| study.drive(case).map_err(|e| StudyError::from(e.to_string()));
-        let driven = progress::watched("drives", |watch| {
-            arguments.threads.run(|| each(&cases, watch, drive))
-        })??;
-        let results = study.summarise(&cases, &driven);
+        let level = arguments.level.level;
+        let results = driven(&hands::Study { file, hours, level }, "drives", &arguments.threads)?;
         return output.show(&hands_report(&results), &results, true);
     }
     if arguments.reading {
-        let study = reading::Study { file };
-        let cases = study.cases();
-        let drive = |case: &reading::Case| {
-            let scenario = study
-                .scenario(case)
-                .map_err(|e| StudyError::from(e.to_string()))?;
-            let read = haptic_batch::run::run(scenario, false)?.results.k_hg;
-            Ok(read.map(|read| [read.k_hg, read.deviation]))
-        };
-        let readings = progress::watched("drives", |watch| {
-            arguments.threads.run(|| each(&cases, watch, drive))
-        })??;
-        let results = study.summarise(&cases, &readings);
+        let results = driven(&reading::Study { file, read }, "drives", &arguments.threads)?;
         return output.show(&reading_report(&results), &results, true);
     }
     let results = sensors::run(&file)?;

@@ -4,6 +4,7 @@
 //! Law (9) guides in float64, without the ECU: its envelope, modes and checks are not part of this. Drivers keep the gains that the paper
 //! found on its column, which has no assist.
 
+use haptic_engine::{Part, Plan, StudyError};
 use haptic_sim::fields::InFile;
 use haptic_sim::guidance::{FloatLaw, Guidance, NoGuidance};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
@@ -192,17 +193,6 @@ pub struct Results {
     pub drivers: Vec<GroupRow>,
 }
 
-/// Why a case cannot be driven.
-#[derive(Debug, thiserror::Error)]
-pub enum CaseError {
-    /// A scenario that cannot be.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// A road that cannot be.
-    #[error(transparent)]
-    Course(#[from] CourseError),
-}
-
 /// The study, of a column.
 #[derive(Debug, Clone, Default)]
 pub struct Study {
@@ -218,26 +208,6 @@ impl Study {
             .into_iter()
             .chain(assisted)
             .collect()
-    }
-
-    /// Every drive.
-    pub fn cases(&self) -> Vec<Case> {
-        let mut cases = Vec::new();
-        for column in self.columns() {
-            for group in Group::ALL {
-                // By hand there is nothing to bring in.
-                if group == Group::Manual && matches!(column, Column::Assisted(_, Inject::Offset)) {
-                    continue;
-                }
-                cases.extend(group.drivers().into_iter().map(|(driver, gains)| Case {
-                    column,
-                    group,
-                    driver,
-                    gains,
-                }));
-            }
-        }
-        cases
     }
 
     /// The car with another assist, and the guidance brought in there.
@@ -258,7 +228,7 @@ impl Study {
     }
 
     /// The drive of a case.
-    fn scenario(&self, case: &Case, kind: FailureKind) -> Result<Scenario, CaseError> {
+    fn scenario(&self, case: &Case, kind: FailureKind) -> Result<Scenario, StudyError> {
         let failure = Failure {
             kind,
             time_s: LOST_AT_S,
@@ -292,8 +262,8 @@ impl Study {
     ///
     /// # Errors
     /// A column or a scenario that cannot be.
-    pub fn drive(&self, case: &Case) -> Result<Driven, CaseError> {
-        let peak = |kind| -> Result<Option<f64>, CaseError> {
+    pub fn driven(&self, case: &Case) -> Result<Driven, StudyError> {
+        let peak = |kind| -> Result<Option<f64>, StudyError> {
             let scenario = self.scenario(case, kind)?;
             Ok(match case.group {
                 Group::Manual => peak_of(&scenario, NoGuidance),
@@ -322,19 +292,6 @@ impl Study {
             motor_nm: motor
                 .map(|[_, motor]| motor.norm())
                 .filter(|_| case.group != Group::Manual),
-        })
-    }
-
-    /// What the drives say, with what no drive is needed for.
-    ///
-    /// # Errors
-    /// A column that cannot be.
-    pub fn summarise(&self, cases: &[Case], driven: &[Driven]) -> Result<Results, ScenarioError> {
-        Ok(Results {
-            column: InFile(self.file.column),
-            felt: self.felt()?,
-            loops: self.loops()?,
-            drivers: self.groups(cases, driven),
         })
     }
 
@@ -426,6 +383,45 @@ impl Study {
             }
         }
         rows
+    }
+}
+
+impl haptic_engine::Study for Study {
+    type Case = Case;
+    type Row = Driven;
+    type Results = Results;
+
+    fn plan(&self) -> Result<Plan<Case>, StudyError> {
+        let mut cases = Vec::new();
+        for column in self.columns() {
+            for group in Group::ALL {
+                // By hand there is nothing to bring in.
+                if group == Group::Manual && matches!(column, Column::Assisted(_, Inject::Offset)) {
+                    continue;
+                }
+                cases.extend(group.drivers().into_iter().map(|(driver, gains)| Case {
+                    column,
+                    group,
+                    driver,
+                    gains,
+                }));
+            }
+        }
+        Ok(Plan::one_by_one(cases))
+    }
+
+    fn drive(&self, part: &Part<'_, Case, Driven>) -> Result<Vec<Driven>, StudyError> {
+        part.one_by_one(|case| self.driven(case))
+    }
+
+    /// What the drives say, with what no drive is needed for.
+    fn summarise(&self, cases: Vec<Case>, driven: Vec<Driven>) -> Result<Results, StudyError> {
+        Ok(Results {
+            column: InFile(self.file.column),
+            felt: self.felt()?,
+            loops: self.loops()?,
+            drivers: self.groups(&cases, &driven),
+        })
     }
 }
 

@@ -10,13 +10,13 @@ use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
+use haptic_engine::StudyError;
 use haptic_sim::models::torsion_bar::BarPlant;
 use haptic_sim::parts::{Acting, Vehicle};
 use haptic_sim::scenario::ScenarioError;
 use serde::Serialize;
 
-use super::sensors::SensorsError;
-use super::{ColumnFile, believed};
+use super::{ColumnFile, believed, no_observer};
 
 /// Speed, m/s, and bank of the road, rad.
 const SPEED: f64 = 60.0 / 3.6;
@@ -59,8 +59,8 @@ struct Loop {
 }
 
 impl Loop {
-    fn new(file: &ColumnFile, believed: &Params, delivered: Delivered) -> Result<Self, SensorsError> {
-        let setup = Setup::new(believed).map_err(SensorsError::Setup)?;
+    fn new(file: &ColumnFile, believed: &Params, delivered: Delivered) -> Result<Self, StudyError> {
+        let setup = Setup::new(believed).map_err(no_observer)?;
         Ok(Self {
             ecu: Ecu::new(Some(&setup), Boot::default(), Instant::from_us(0)),
             plant: plant(file)?,
@@ -181,7 +181,7 @@ fn drive(
     of: &Params,
     delivered: Delivered,
     (probe, hands): (bool, Hands),
-) -> Result<Seen, SensorsError> {
+) -> Result<Seen, StudyError> {
     let mut car = Loop::new(file, of, delivered)?;
     car.probe = probe;
     let (mut seen, mut before_nm) = (Seen::default(), f64::NAN);
@@ -217,7 +217,7 @@ fn drive(
 ///
 /// # Errors
 /// A column that cannot be, or that the ECU cannot be told of.
-pub fn run(file: &ColumnFile) -> Result<Vec<Row>, SensorsError> {
+pub fn run(file: &ColumnFile) -> Result<Vec<Row>, StudyError> {
     let right = believed(file, 0.002, Params::PAPER.observer_bandwidth_rad_per_s);
     let wrong = |inertia: f64, stiffness: f64| Params {
         wheel_inertia_kg_m2: inertia * right.wheel_inertia_kg_m2,

@@ -13,6 +13,8 @@ use std::f64::consts::{PI, TAU};
 use haptic_core::controller::config::Config;
 use haptic_core::observer::State;
 use haptic_core::quantity::{Radians, Torque};
+use haptic_engine::statistics::Confidence;
+use haptic_engine::{Part, Plan, StudyError};
 use haptic_sim::Scenario;
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::nonlinear::WorldParameters;
@@ -24,8 +26,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
-use super::sensors::{Rate, SensorsError};
-use super::{ColumnFile, believed, hands_torque};
+use super::{ColumnFile, Rate, believed, hands_torque, no_observer};
 
 /// A larger mean torque is that of a hand: it is above the offset of a sensor.
 pub const HELD_NM: f64 = 0.35;
@@ -171,7 +172,7 @@ pub struct Told {
     /// Threshold, N.m.
     pub threshold_nm: f64,
     /// After so many seconds without a felt hand there is a warning: those for one false one in [`FALSE_IN_H`], and the ends of
-    /// their interval (95 %).
+    /// their interval, of the study's level.
     pub after_s: [f64; 3],
     /// Median time from letting go to the warning, s; none where most stretches end before.
     pub warned_s: Option<f64>,
@@ -201,6 +202,9 @@ pub struct Results {
     pub rows: Vec<Row>,
     /// The file's wheel by the finer observer.
     pub roc: Vec<Roc>,
+    /// How often intervals hold.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
 }
 
 /// The study, of a column.
@@ -210,6 +214,8 @@ pub struct Study {
     pub file: ColumnFile,
     /// Hours of each drive.
     pub hours: f64,
+    /// How often intervals hold.
+    pub level: Confidence,
 }
 
 /// A white noise through a lag: its standard deviation and time constant.
@@ -364,27 +370,11 @@ impl Study {
         own.into_iter().chain(others).collect()
     }
 
-    /// Every drive.
-    pub fn cases(&self) -> Vec<Case> {
-        let mut cases = Vec::new();
-        for (wheel, scene) in self.places() {
-            for hand in Hand::ALL {
-                cases.extend([true, false].map(|chooses| Case {
-                    wheel,
-                    scene,
-                    hand,
-                    chooses,
-                }));
-            }
-        }
-        cases
-    }
-
     /// Drives a case.
     ///
     /// # Errors
     /// A column that cannot be, or that the observer cannot be set up for.
-    pub fn drive(&self, case: &Case) -> Result<Driven, SensorsError> {
+    pub fn driven(&self, case: &Case) -> Result<Driven, StudyError> {
         let wheel = self.wheels()[case.wheel];
         let mut file = self.file.clone();
         (file.column.j_w_kg_m2, file.column.k_tb_nm_per_rad) = (wheel.j_w_kg_m2, wheel.k_tb_nm_per_rad);
@@ -409,7 +399,7 @@ impl Study {
                 } => {
                     let mut of = believed(&file, 1.0 / rate.hz(), bandwidth);
                     of.wheel_inertia_kg_m2 *= j_w_share;
-                    let config = Config::new(&of).map_err(SensorsError::Setup)?;
+                    let config = Config::new(&of).map_err(no_observer)?;
                     Some((config, State::NEW, step_deg.to_radians(), rate))
                 }
             });
@@ -444,9 +434,33 @@ impl Study {
         }
         Ok(driven)
     }
+}
 
-    /// What the drives say.
-    pub fn summarise(&self, cases: &[Case], driven: &[Driven]) -> Results {
+impl haptic_engine::Study for Study {
+    type Case = Case;
+    type Row = Driven;
+    type Results = Results;
+
+    fn plan(&self) -> Result<Plan<Case>, StudyError> {
+        let mut cases = Vec::new();
+        for (wheel, scene) in self.places() {
+            for hand in Hand::ALL {
+                cases.extend([true, false].map(|chooses| Case {
+                    wheel,
+                    scene,
+                    hand,
+                    chooses,
+                }));
+            }
+        }
+        Ok(Plan::one_by_one(cases))
+    }
+
+    fn drive(&self, part: &Part<'_, Case, Driven>) -> Result<Vec<Driven>, StudyError> {
+        part.one_by_one(|case| self.driven(case))
+    }
+
+    fn summarise(&self, cases: Vec<Case>, driven: Vec<Driven>) -> Result<Results, StudyError> {
         let (wheels, mut rows, mut roc) = (self.wheels(), Vec::new(), Vec::new());
         for (wheel, scene) in self.places() {
             for (k, eye) in Self::eyes(wheel).iter().enumerate() {
@@ -464,7 +478,7 @@ impl Study {
                         scene,
                         eye: *eye,
                         hand,
-                        told: told(none, hands, self.hours),
+                        told: told(none, hands, self.hours, self.level),
                     });
                     if (wheel, k) == (0, 0) {
                         let share = |seconds: &[[f64; 2]], threshold| {
@@ -482,12 +496,13 @@ impl Study {
                 }
             }
         }
-        Results {
+        Ok(Results {
             curve: self.file.one_curve().0,
             hours: self.hours,
             rows,
             roc,
-        }
+            level: self.level,
+        })
     }
 }
 
@@ -511,7 +526,7 @@ fn stretches(seconds: &[[f64; 2]], threshold_nm: f64) -> Vec<u32> {
 
 /// Seconds without a felt hand that come once in [`FALSE_IN_H`] beside a hand, with the ends of their interval. The longest fifth of the
 /// stretches goes on from second to second with one probability; one more of each kind than was seen, as none is seen too easily.
-pub fn timer_s(seconds: &[[f64; 2]], threshold_nm: f64, hours: f64) -> [f64; 3] {
+pub fn timer_s(seconds: &[[f64; 2]], threshold_nm: f64, hours: f64, level: Confidence) -> [f64; 3] {
     let mut lengths = stretches(seconds, threshold_nm);
     lengths.sort_unstable();
     let from = lengths.get(lengths.len() * 4 / 5).map_or(1, |length| *length);
@@ -525,7 +540,9 @@ pub fn timer_s(seconds: &[[f64; 2]], threshold_nm: f64, hours: f64) -> [f64; 3] 
         1.0 + beyond.len() as f64,
     );
     let share = goes_on / (goes_on + ends);
-    let half = 1.96 * (share * (1.0 - share) / (goes_on + ends)).sqrt();
+    // Published times have two decimals of the quantile, and are whole seconds, which may turn by the third.
+    let deviations = if level.is_usual() { 1.96 } else { level.normal() };
+    let half = deviations * (share * (1.0 - share) / (goes_on + ends)).sqrt();
     let starts_in_100_h = FALSE_IN_H * ends / hours;
     [share, share - half, share + half].map(|share| {
         // A share of 1 never ends, one of 0 at once.
@@ -560,9 +577,9 @@ fn warned_s(seconds: &[[f64; 2]], threshold_nm: f64, after_s: f64) -> Option<f64
 }
 
 /// The threshold with the soonest warning on the first of both halves, and what it does on the second.
-fn told(none: [&[[f64; 2]]; 2], hands: [&[[f64; 2]]; 2], hours: f64) -> Option<Told> {
+fn told(none: [&[[f64; 2]]; 2], hands: [&[[f64; 2]]; 2], hours: f64, level: Confidence) -> Option<Told> {
     let on_first = |k: usize| {
-        let after_s = timer_s(hands[0], threshold_nm(k), hours);
+        let after_s = timer_s(hands[0], threshold_nm(k), hours, level);
         let warned = warned_s(none[0], threshold_nm(k), after_s[0])?;
         (after_s[0] <= LONGEST_S).then_some((warned, threshold_nm(k), after_s))
     };

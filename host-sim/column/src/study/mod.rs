@@ -1,11 +1,11 @@
-//! What integrators and buyers of sensors ask of a torsion bar. Each study is its cases, what one case gives, and a result of all;
-//! threads and progress are whose program it is.
+//! What integrators and buyers of sensors ask of a torsion bar. Where drives are many, a study is a value of the engine's trait
+//! ([`haptic_engine::Study`]), which has threads, progress and an end on request.
 //!
 //! - [`assist`]: overlay or offset, what hands feel of it, margins, what a sudden loss costs.
-//! - [`ecu`]: the ECU behind the bar, where its parameters are right and where they are not.
 //! - [`hands`]: whether a hand is at the wheel, and how soon that is known.
 //! - [`reading`]: what the ECU reads of K_hg through the bar.
-//! - [`sensors`]: the hands' torque by the observer of core, by the angle's sensor.
+//! - [`sensors`]: the hands' torque by the observer of core, by the angle's sensor; with [`ecu`], the ECU behind the bar, where its
+//!   parameters are right and where they are not.
 
 pub mod assist;
 pub mod ecu;
@@ -14,16 +14,18 @@ pub mod reading;
 pub mod sensors;
 
 use haptic_core::controller::config::Config;
-use haptic_core::controller::params::{BAR_AND_COLUMN_ANGLE, Params};
+use haptic_core::controller::params::{BAR_AND_COLUMN_ANGLE, ParamError, Params};
 use haptic_core::observer::{Sensor, State};
 use haptic_core::quantity::{Radians, Torque};
+use haptic_engine::StudyError;
 use haptic_sim::Scenario;
 use haptic_sim::fields::InFile;
+use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::torsion_bar::{
     AssistParameters, BarPlant, ColumnKind, ColumnParameters, CurveChoice, Usual,
 };
 use haptic_sim::scenario::{GuidanceParameters, ScenarioBuilder, ScenarioError};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A column of one's own, as a file (TOML) has it: the two tables of a scenario. It has a bar whatever its kind says.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -94,6 +96,36 @@ impl ColumnFile {
         let medium = curves.iter().position(|(name, _)| *name == Usual::Medium.name());
         curves.swap_remove(medium.unwrap_or(0))
     }
+}
+
+/// How often an angle is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rate {
+    /// 1 kHz.
+    EveryStep,
+    /// 120 Hz, on the grid of 1 ms.
+    Camera,
+}
+
+impl Rate {
+    /// In Hz.
+    pub fn hz(self) -> f64 {
+        match self {
+            Self::EveryStep => 1000.0,
+            Self::Camera => 120.0,
+        }
+    }
+
+    /// Whether an angle is sampled in a step.
+    fn samples(self, step: u32) -> bool {
+        self == Self::EveryStep || camera_looks(step)
+    }
+}
+
+/// A column that the observer cannot be set up for.
+fn no_observer(why: ParamError) -> StudyError {
+    format!("the observer: {why}").into()
 }
 
 /// What an ECU is told of a file's column, whose angle comes every so many seconds.

@@ -2,6 +2,7 @@
 //!
 //! [K_hg]: haptic_core::estimator
 
+use haptic_engine::{Part, Plan, StudyError};
 use haptic_sim::Scenario;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::torsion_bar::{AngleSensor, AssistParameters, ColumnParameters, CurveChoice};
@@ -94,23 +95,19 @@ pub struct Results {
     pub rows: Vec<Row>,
 }
 
+/// The last reading of a drive, value and standard deviation; none where there was none.
+pub type Reading = Option<[f64; 2]>;
+
 /// The study of a column.
 #[derive(Debug, Clone)]
 pub struct Study {
     /// Wheel, bar, friction and assist.
     pub file: ColumnFile,
+    /// Drives a scenario and reads what the ECU says at its end.
+    pub read: fn(Scenario) -> Result<Reading, StudyError>,
 }
 
 impl Study {
-    /// Its drives.
-    pub fn cases(&self) -> Vec<Case> {
-        let of = |column| {
-            K_HG.into_iter()
-                .flat_map(move |k_hg| (1..=SEEDS).map(move |seed| Case { column, k_hg, seed }))
-        };
-        Column::ALL.into_iter().flat_map(of).collect()
-    }
-
     /// The drive of a case.
     ///
     /// # Errors
@@ -175,14 +172,31 @@ impl Study {
         let told = probed.told_of(&file.column);
         file.with(builder).guidance(told).build()
     }
+}
 
-    /// What the drives show. A reading is the last of its drive, value and standard deviation; none where there was none.
-    pub fn summarise(&self, cases: &[Case], readings: &[Option<[f64; 2]>]) -> Results {
+impl haptic_engine::Study for Study {
+    type Case = Case;
+    type Row = Reading;
+    type Results = Results;
+
+    fn plan(&self) -> Result<Plan<Case>, StudyError> {
+        let of = |column| {
+            K_HG.into_iter()
+                .flat_map(move |k_hg| (1..=SEEDS).map(move |seed| Case { column, k_hg, seed }))
+        };
+        Ok(Plan::one_by_one(Column::ALL.into_iter().flat_map(of).collect()))
+    }
+
+    fn drive(&self, part: &Part<'_, Case, Reading>) -> Result<Vec<Reading>, StudyError> {
+        part.one_by_one(|case| (self.read)(self.scenario(case)?))
+    }
+
+    fn summarise(&self, cases: Vec<Case>, readings: Vec<Reading>) -> Result<Results, StudyError> {
         let slope = self.file.one_curve().1.assist().slope(0.0, SPEED_KMH / 3.6);
         let row = |column, k_hg| {
             let here = cases
                 .iter()
-                .zip(readings)
+                .zip(&readings)
                 .filter(|(case, _)| case.column == column && case.k_hg == k_hg);
             let read: Vec<[f64; 2]> = here.filter_map(|(_, reading)| *reading).collect();
             let mean = |of: &dyn Fn(&[f64; 2]) -> f64| read.iter().map(of).sum::<f64>() / read.len() as f64;
@@ -199,8 +213,8 @@ impl Study {
             }
         };
         let of = |column| K_HG.into_iter().map(move |k_hg| row(column, k_hg));
-        Results {
+        Ok(Results {
             rows: Column::ALL.into_iter().flat_map(of).collect(),
-        }
+        })
     }
 }

@@ -7,15 +7,15 @@
 use std::f64::consts::TAU;
 
 use haptic_core::controller::config::{Config, hands_lag_s};
-use haptic_core::controller::params::{ParamError, Params};
+use haptic_core::controller::params::Params;
 use haptic_core::observer::State;
 use haptic_core::quantity::{Radians, Torque};
-use haptic_sim::models::sensors::camera_looks;
+use haptic_engine::StudyError;
 use haptic_sim::parts::{Acting, Vehicle};
 use haptic_sim::scenario::ScenarioError;
 use serde::Serialize;
 
-use super::{ColumnFile, believed, ecu, hands_torque, rms};
+use super::{ColumnFile, Rate, believed, ecu, hands_torque, no_observer, rms};
 
 /// Steps of the angle's sensor, degrees.
 pub const STEPS_DEG: [f64; 3] = [0.005, 0.02, 0.1];
@@ -32,31 +32,6 @@ pub const WRONG_K_TB: f64 = 0.1;
 /// Steps of each half, and those at its beginning that nothing is judged by.
 const HALF: usize = 20_000;
 const SETTLES: usize = 2_000;
-
-/// How often an angle is sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Rate {
-    /// 1 kHz.
-    EveryStep,
-    /// 120 Hz, on the grid of 1 ms.
-    Camera,
-}
-
-impl Rate {
-    /// In Hz.
-    pub fn hz(self) -> f64 {
-        match self {
-            Self::EveryStep => 1000.0,
-            Self::Camera => 120.0,
-        }
-    }
-
-    /// Whether an angle is sampled in a step.
-    pub(super) fn samples(self, step: u32) -> bool {
-        self == Self::EveryStep || camera_looks(step)
-    }
-}
 
 /// An observer with a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -111,17 +86,6 @@ impl Results {
     }
 }
 
-/// Why there are no results.
-#[derive(Debug, thiserror::Error)]
-pub enum SensorsError {
-    /// A column that cannot be.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// A column that the observer cannot be set up for.
-    #[error("the observer: {0}")]
-    Setup(ParamError),
-}
-
 /// What was seen in a millisecond.
 struct Seen {
     hands_nm: f64,
@@ -157,8 +121,8 @@ fn record(file: &ColumnFile, is_held: bool) -> Result<Vec<Seen>, ScenarioError> 
 }
 
 /// What an observer says of a record, less the hands' torque of its lag ago: root of the mean square, N.m.
-fn deviation(of: &Params, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, SensorsError> {
-    let config = Config::new(of).map_err(SensorsError::Setup)?;
+fn deviation(of: &Params, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f64, StudyError> {
+    let config = Config::new(of).map_err(no_observer)?;
     let (mut state, step_rad) = (State::NEW, step_deg.to_radians());
     let lag = 1e3 * hands_lag_s(of);
     let (whole, rest) = (lag.floor() as usize, lag.fract());
@@ -178,7 +142,7 @@ fn deviation(of: &Params, seen: &[Seen], step_deg: f64, rate: Rate) -> Result<f6
 ///
 /// # Errors
 /// A column that cannot be.
-pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
+pub fn run(file: &ColumnFile) -> Result<Results, StudyError> {
     let [held, free] = [record(file, true)?, record(file, false)?];
     let mut rows = Vec::new();
     for rate in RATES {
@@ -187,7 +151,7 @@ pub fn run(file: &ColumnFile) -> Result<Results, SensorsError> {
                 let right = believed(file, 1.0 / rate.hz(), bandwidth);
                 let error = |of: Params| deviation(&of, &held, step_deg, rate);
                 let wrong = |change: &dyn Fn(f64) -> Params, by: f64| {
-                    Ok::<_, SensorsError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
+                    Ok::<_, StudyError>(error(change(1.0 - by))?.max(error(change(1.0 + by))?))
                 };
                 rows.push(Row {
                     step_deg,

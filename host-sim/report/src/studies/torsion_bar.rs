@@ -348,9 +348,10 @@ pub fn hands_report(results: &hands::Results) -> Report {
     let rows = results.rows.chunks(Hand::ALL.len() - 1).map(told_row);
     let caption = format!(
         "Median time from letting go to a warning that is false once in {} h beside that hand, and in brackets the least and the largest time \
-         without a felt hand after which it comes (95 % of what {} h of each hand say); a dash: not told from no hand within {:.0} s. The last \
+         without a felt hand after which it comes ({} % of what {} h of each hand say); a dash: not told from no hand within {:.0} s. The last \
          column counts the false warnings of {:.2} h beside the three hands",
         hands::FALSE_IN_H,
+        results.level,
         results.hours,
         hands::LONGEST_S,
         3.0 * results.hours
