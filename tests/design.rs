@@ -1,5 +1,6 @@
 //! Which experiment tells a driver: what `host-sim design` promises is held against drives that were identified.
 
+use haptic_batch::Confidence;
 use haptic_batch::design::{DesignRequest, design};
 use haptic_batch::engine::Watch;
 use haptic_sim::models::road::Course;
@@ -15,6 +16,7 @@ fn question() -> DesignRequest {
         t_nms_known: true,
         confirmations: 6,
         seed: 1,
+        level: Confidence::USUAL,
     }
 }
 

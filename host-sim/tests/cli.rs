@@ -412,6 +412,103 @@ fn a_study_fits_the_terminal_and_names_its_report() {
     }
 }
 
+fn width(ends: &Value) -> f64 {
+    ends[1].as_f64().unwrap() - ends[0].as_f64().unwrap()
+}
+
+fn succeeded(directory: &Path, arguments: &[&str]) -> Output {
+    let output = host_sim(directory, arguments);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{arguments:?}: {}",
+        stderr(&output)
+    );
+    output
+}
+
+/// Normal quantiles of tables: 0.67449 at 50 %, of which Wilson's interval of two fits is made; 2.575829 at 99 % beside 1.959964 at 95 %, in the
+/// intervals of the published method, which no bound cuts here.
+#[test]
+fn json_and_tables_name_another_level_than_95_percent() {
+    let directory = tempfile::tempdir().unwrap();
+    let designed = [
+        "design",
+        "--participant",
+        "3",
+        "--confirm",
+        "2",
+        "--frequencies",
+        "2.5",
+    ];
+    let found = json(&succeeded(
+        directory.path(),
+        &[&designed[..], &["--level", "0.5", "--json"]].concat(),
+    ));
+    let tried = &found["confirmation"];
+    let [count, share] = [2.0, tried["identified"].as_f64().unwrap() / 2.0];
+    let square = 0.674_49_f64.powi(2) / count;
+    let half = (square * share * (1.0 - share) + 0.25 * square * square).sqrt();
+    for (end, sign) in [(0, -1.0), (1, 1.0)] {
+        let wanted = (share + 0.5 * square + sign * half) / (1.0 + square);
+        let end = tried["identified_share"][end].as_f64().unwrap();
+        assert!((end - wanted).abs() < 1e-5, "{tried}");
+    }
+    assert_eq!(found["level"], 0.5);
+    let found = json(&succeeded(
+        directory.path(),
+        &["experiment", "--participant", "3", "--level", "0.99", "--json"],
+    ));
+    assert_eq!(found["level"], 0.99);
+    let own = &found["drives"][1]["paper"];
+    let wider = width(&own["intervals"]["gain_3"]) / width(&own["parameters"]["gain_3"]["interval_95"]);
+    assert!((wider - 2.575_829 / 1.959_964).abs() < 1e-5, "{wider}");
+}
+
+/// Normal quantiles of tables, 2.575829 at 99 %, of each quantity's error; of a value above zero in its logarithm.
+#[test]
+fn a_vehicle_has_intervals_of_another_level_and_the_same_verdicts() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(
+        directory.path().join("car.toml"),
+        "[driver]\nremnant_sd_nm = 0.4\n",
+    )
+    .unwrap();
+    succeeded(directory.path(), &["run", "car.toml", "--out", "car"]);
+    let identify = [
+        "identify-vehicle",
+        "car/run.csv",
+        "--mass=1226",
+        "--wheelbase=2.393",
+    ];
+    let wide = [&identify[..], &["--level", "0.99"]].concat();
+    let words = |arguments: &[&str]| {
+        let output = host_sim(directory.path(), arguments);
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert!(words(&identify).contains("95 % from") && words(&wide).contains("99 % from"));
+    let [usual, wide] = [&identify[..], &wide].map(|arguments| words(&[arguments, &["--json"]].concat()));
+    let [usual, wide] = [usual, wide].map(|text| serde_json::from_str::<Value>(&text).unwrap());
+    assert_eq!((usual.get("level"), usual.get("intervals")), (None, None));
+    assert_eq!(wide["level"], 0.99);
+    let quantities = wide["quantities"].as_array().unwrap();
+    assert_eq!(&wide["quantities"], &usual["quantities"]);
+    let log_width = |ends: &Value| (ends[1].as_f64().unwrap() / ends[0].as_f64().unwrap()).ln();
+    for quantity in quantities {
+        let name = quantity["name"].as_str().unwrap();
+        let (own, as_published) = (&wide["intervals"][name], &quantity["interval_95"]);
+        if ["wheel_angle_offset", "understeer_gradient", "torque_offset"].contains(&name) {
+            let reach = 0.5 * width(own) / quantity["standard_error"].as_f64().unwrap();
+            assert!((reach - 2.575_829).abs() < 1e-5, "{name}: {reach}");
+        } else if name != "friction" {
+            // What is published has the two decimals of 1.96.
+            let wider = log_width(own) / log_width(as_published);
+            assert!((wider - 2.575_829 / 1.96).abs() < 1e-5, "{name}: {wider}");
+        }
+    }
+    assert_eq!(quantities.len(), 15);
+}
+
 /// A clean log of participants with a known truth: nothing false is identified. One drive of each is too few to hold the
 /// truth in 93 to 97 %, which is said.
 #[test]

@@ -54,6 +54,31 @@ fn a_design_leaves_the_same_bytes_on_any_threads_and_behind_an_interrupt() {
     assert!(!folder.join("wrong").exists());
     let run = host_sim(folder, &["run", "1/chosen.toml"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    // Another level drives nothing anew. Two draws have one degree of freedom: 12.7062 at 95 % and 63.6567 at 99 % in tables.
+    let before = sets("1");
+    let output = design(folder, &["--out", "1", "--level", "0.99"]);
+    let said = String::from_utf8_lossy(&output.stdout).replace('\n', " ");
+    assert!(
+        said.contains("Intervals of 99 % are") && said.contains("judged by intervals of 95 %"),
+        "{said}"
+    );
+    assert_eq!(before, sets("1"));
+    let width = |place: &str, field: &str| {
+        let text = fs::read_to_string(folder.join(place).join("results.json")).unwrap();
+        let results: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let ends = &results["choices"][1]["held_out"][0][field];
+        (
+            ends[1].as_f64().unwrap() - ends[0].as_f64().unwrap(),
+            results.get("level").cloned(),
+        )
+    };
+    let [(usual, none), (wide, level)] =
+        [("2", "interval_95"), ("1", "interval_99")].map(|(at, field)| width(at, field));
+    assert!(
+        (wide / usual / (63.6567 / 12.7062) - 1.0).abs() < 1e-5,
+        "{wide} {usual}"
+    );
+    assert_eq!((none, level), (None, Some(0.99.into())));
 }
 
 /// A peak of a tenth and no more conflict than the paper's: nothing has both, and the front says so instead of a choice that looks right.

@@ -11,7 +11,6 @@
 use haptic_analysis::identify::{DriveLog, INFORMED, Information, Options, identify_together, information};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{PublishedDriver, participant};
-use haptic_sim::share::wilson;
 use serde::Serialize;
 
 use crate::Away;
@@ -19,7 +18,7 @@ use crate::drivers::{Probe, compared, guided_drive, truth_of};
 use crate::engine::recorded;
 use crate::engine::{StudyError, refuse};
 use crate::engine::{Watch, each, logs};
-use crate::statistics::{mean, rms};
+use crate::statistics::{Confidence, mean, rms, wilson};
 
 /// The drives, courses and probes to choose from, and the error to reach.
 #[derive(Debug, Clone)]
@@ -42,6 +41,8 @@ pub struct DesignRequest {
     pub confirmations: u32,
     /// Seed of the remnants.
     pub seed: u64,
+    /// How often intervals hold.
+    pub level: Confidence,
 }
 
 /// One design.
@@ -77,11 +78,11 @@ pub struct Confirmation {
     pub predicted: f64,
     /// Root mean square error.
     pub rms: f64,
-    /// Share of the 95 % intervals that hold the truth.
+    /// Share of the intervals that hold the truth.
     pub coverage: f64,
     /// Fits that call the parameter identified.
     pub identified: usize,
-    /// Wilson's 95 % interval of the share of drives that do.
+    /// Wilson's interval of the share of drives that do.
     pub identified_share: [f64; 2],
 }
 
@@ -100,6 +101,9 @@ pub struct DesignResult {
     pub confirmation: Option<Confirmation>,
     /// The shortest length tried at which the parameter is identified in 95 % of the fits; none if none up to half an hour is.
     pub for_most: Option<Confirmation>,
+    /// How often intervals hold.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
 }
 
 /// Longest drive that is worth proposing, s: two hours.
@@ -199,6 +203,7 @@ pub fn design(request: &DesignRequest, watch: &Watch<'_>) -> Result<DesignResult
         best,
         confirmation,
         for_most: most,
+        level: request.level,
     })
 }
 
@@ -376,7 +381,7 @@ fn confirm(
         let promised = predicted.map_or(f64::NAN, |p| p.standard_errors(request.t_nms_known)[place]);
         let off = p.optimum.map_or(f64::NAN, |x| x - truth);
         let held = p
-            .interval_95
+            .interval(request.level.normal())
             .is_none_or(|[low, high]| low <= truth && truth <= high);
         Ok((off, held, promised, p.identified))
     })?;
@@ -389,7 +394,7 @@ fn confirm(
         rms: rms(found.iter().map(|x| x.0)).unwrap_or(f64::NAN),
         coverage: found.iter().filter(|x| x.1).count() as f64 / count,
         identified,
-        identified_share: wilson(identified as f64 / count, count),
+        identified_share: wilson(identified as f64 / count, count, request.level),
     })
 }
 

@@ -1,5 +1,7 @@
 //! Drivers as scenarios: the published ones, guided and logged, and those that were identified; and what is compared of the two.
 
+use std::collections::BTreeMap;
+
 use haptic_analysis::identify::{Identification, Muscle, Parameter, Parameters, TABLE_4, Truth};
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
@@ -10,6 +12,18 @@ use serde::Serialize;
 
 use crate::engine::StudyError;
 use crate::paper::REMNANT_GUIDED_NM;
+use crate::statistics::Confidence;
+
+/// Intervals by key; none where the data put no bound on a parameter, or contradict the model.
+pub type Intervals = BTreeMap<&'static str, Option<[f64; 2]>>;
+
+/// The intervals of an identification at a level; empty at 95 %, as those stand beside each parameter.
+pub(crate) fn intervals(found: &Identification, level: Confidence) -> Intervals {
+    let list = found.parameters.list().into_iter();
+    let list = list.filter(|_| !level.is_usual());
+    list.map(|(name, _, p)| (name, p.interval(level.normal())))
+        .collect()
+}
 
 /// A probe of the controller's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

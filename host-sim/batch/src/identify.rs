@@ -1,12 +1,11 @@
 //! One recorded drive, identified: what was found, and on request how the identified driver drives a course.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use super::RunRecord;
 use super::record::default_window;
-use crate::drivers::identified_driver;
+pub use crate::drivers::Intervals;
+use crate::drivers::{identified_driver, intervals};
 use crate::engine::StudyError;
 use crate::engine::{Watch, each};
 use crate::several::{Difference, Population, differences, population};
@@ -75,16 +74,10 @@ pub struct IdentificationResults {
     pub intervals: Vec<Intervals>,
 }
 
-/// Intervals by key; none where the data put no bound on a parameter, or contradict the model.
-pub type Intervals = BTreeMap<&'static str, Option<[f64; 2]>>;
-
 /// None of 95 %.
-fn intervals<'a>(all: impl Iterator<Item = &'a Identification>, level: Confidence) -> Vec<Intervals> {
-    let all = all
-        .filter(|_| !level.is_usual())
-        .map(|found| found.parameters.list());
-    all.map(|list| list.map(|(name, _, p)| (name, p.interval(level.normal()))).into())
-        .collect()
+fn all_intervals<'a>(all: impl Iterator<Item = &'a Identification>, level: Confidence) -> Vec<Intervals> {
+    let all = all.filter(|_| !level.is_usual());
+    all.map(|found| intervals(found, level)).collect()
 }
 
 fn drive_of(name: &str, identification: Identification, tracking: Tracking) -> IdentifiedDrive {
@@ -205,7 +198,7 @@ pub fn compare_drivers(
     let drivers: Vec<(String, Identification)> = found.into_iter().flatten().collect();
     Ok(Drivers {
         level,
-        intervals: intervals(drivers.iter().map(|driver| &driver.1), level),
+        intervals: all_intervals(drivers.iter().map(|driver| &driver.1), level),
         compared,
         drivers,
         differences,
@@ -234,7 +227,7 @@ impl IdentifiedDrive {
         let results = &mut self.results;
         let pieces = results.pieces.iter().flat_map(|found| &found.pieces);
         let all = std::iter::once(&results.identification).chain(pieces.map(|piece| &piece.identification));
-        results.intervals = intervals(all, level);
+        results.intervals = all_intervals(all, level);
         results.level = level;
     }
 

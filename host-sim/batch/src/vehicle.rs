@@ -1,5 +1,6 @@
 //! The vehicle of a recorded drive as a scenario's tables.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use haptic_log::recording::Recording;
@@ -8,8 +9,50 @@ use haptic_sim::scenario::Scenario;
 use haptic_vehicle::{
     Known, Quantity, VehicleColumns, VehicleIdentification, VehicleLog, Verdict, identify_vehicle,
 };
+use serde::Serialize;
 
+use crate::drivers::Intervals;
 use crate::engine::StudyError;
+use crate::statistics::Confidence;
+
+/// The vehicle of a drive, with intervals of a level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IdentifiedVehicle {
+    /// What the drive tells. What is called identified is a matter of 95 %, as are the intervals beside each quantity; what a manoeuvre
+    /// would tell is of the level.
+    #[serde(flatten)]
+    pub identification: VehicleIdentification,
+    /// How often the intervals of the report hold.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
+    /// Intervals of that level, where it is not 95 %.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub intervals: Intervals,
+}
+
+impl IdentifiedVehicle {
+    fn new(mut identification: VehicleIdentification, level: Confidence) -> Self {
+        let mut intervals = Intervals::new();
+        if !level.is_usual() {
+            let tells = identification.manoeuvres.iter_mut().flat_map(|of| &mut of.tells);
+            tells.for_each(|telling| telling.hold_at(level.normal()));
+            let quantities = identification.quantities.iter();
+            intervals.extend(quantities.map(|q| (q.name, q.interval(level.normal()))));
+        }
+        Self {
+            identification,
+            level,
+            intervals,
+        }
+    }
+
+    /// The interval of a quantity at the level.
+    #[must_use]
+    pub fn interval(&self, quantity: &Quantity) -> Option<[f64; 2]> {
+        let own = self.intervals.get(quantity.name);
+        own.map_or(quantity.interval_95, |interval| *interval)
+    }
+}
 
 /// Identifies the vehicle of a recording, of which pauses up to `bridge_s` are bridged.
 ///
@@ -19,10 +62,11 @@ pub fn identify(
     recording: &Recording,
     known: &Known,
     bridge_s: f64,
-) -> Result<VehicleIdentification, StudyError> {
+    level: Confidence,
+) -> Result<IdentifiedVehicle, StudyError> {
     let columns = VehicleColumns::of(recording, bridge_s)?;
     let log = VehicleLog::new(&columns, known.wheelbase_m)?;
-    Ok(identify_vehicle(&log, known))
+    Ok(IdentifiedVehicle::new(identify_vehicle(&log, known), level))
 }
 
 /// Six digits: more than any drive tells.

@@ -8,7 +8,7 @@ use haptic_report::studies::design::report;
 use haptic_sim::models::road::{Course, LaneChoice};
 
 use super::participants::Participants;
-use super::results::ResultArguments;
+use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, progress, road};
 
 #[derive(Debug, Args)]
@@ -41,6 +41,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
+    level: LevelArgument,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
@@ -63,6 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         t_nms_known: arguments.t_nms_known,
         confirmations: arguments.confirm,
         seed: arguments.seed,
+        level: arguments.level.level,
     };
     let output = arguments.results.begin("design")?;
     let answer = progress::watched("drives", |watch| design(&question, watch))?;

@@ -11,7 +11,7 @@ use serde_json::json;
 use super::checkpoint::Checkpoint;
 use super::output;
 use super::progress::Threads;
-use super::results::ResultArguments;
+use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, in_file, progress};
 
 const OUT: &str = "Directory: every set that was driven, report, results and chosen.toml, which `run` and `ecu parameters` take. A search that was interrupted goes on where it was";
@@ -33,11 +33,14 @@ pub(super) struct Arguments {
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
+    level: LevelArgument,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let design = DesignGuidance::load(&arguments.file, arguments.own_line_share)?;
+    let mut design = DesignGuidance::load(&arguments.file, arguments.own_line_share)?;
+    design.level = arguments.level.level;
     let chosen = design.row(arguments.choose)?;
     let out = arguments.results.directory();
     output::check(out, "design-guidance", &[SETS])?;

@@ -5,7 +5,7 @@ use haptic_batch::experiment::experiment;
 use haptic_report::studies::experiment::{report, write_logs};
 
 use super::participants::Drives;
-use super::results::{DEFAULT_OUT, ResultArguments};
+use super::results::{DEFAULT_OUT, LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
@@ -17,13 +17,16 @@ pub(super) struct Arguments {
     #[arg(long)]
     logs: bool,
     #[command(flatten)]
+    level: LevelArgument,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let plan = arguments.drives.plan()?;
     let output = arguments.results.begin("experiment")?;
-    let result = progress::watched("drives", |watch| experiment(&plan, watch))?;
+    let mut result = progress::watched("drives", |watch| experiment(&plan, watch))?;
+    result.hold_at(arguments.level.level);
     if let Some(place) = output.place().filter(|_| arguments.logs) {
         write_logs(&result, &place.join("logs"))?;
     }

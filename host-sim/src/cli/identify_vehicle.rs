@@ -11,7 +11,7 @@ use haptic_report::studies::vehicle::report;
 use haptic_vehicle::Known;
 
 use super::recording::ReadingArguments;
-use super::results::ResultArguments;
+use super::results::{LevelArgument, ResultArguments};
 use super::{BadInput, Outcome, in_file};
 
 const OUT: &str =
@@ -42,6 +42,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     reading: ReadingArguments,
     #[command(flatten)]
+    level: LevelArgument,
+    #[command(flatten)]
     results: ResultArguments,
 }
 
@@ -63,11 +65,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .reading
         .max_gap()?
         .unwrap_or(Options::default().bridge_s);
-    let found = identify(&recording, &known, bridge_s).map_err(in_file(path))?;
-    let file = scenario_file(&found, &path.display().to_string());
+    let found = identify(&recording, &known, bridge_s, arguments.level.level).map_err(in_file(path))?;
+    let file = scenario_file(&found.identification, &path.display().to_string());
     if let (Some(place), Some(text)) = (output.place(), file.map_err(in_file(path))?) {
         write_bytes(&place.join("vehicle.toml"), text)?;
     }
-    let holds = found.checks.iter().all(|check| check.holds);
+    let holds = found.identification.checks.iter().all(|check| check.holds);
     output.show(&report(&found, &path.display().to_string()), &found, holds)
 }

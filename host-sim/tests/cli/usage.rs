@@ -20,7 +20,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("course.toml", "[[segment]]\nlength_m = 500\n");
     write("on-a-tight-road.toml", "course = 'tight.toml'\n");
     write("notes.txt", "of somebody");
-    let cases: [(&[&str], &str); 35] = [
+    let cases: [(&[&str], &str); 38] = [
         (
             &["run", "on-a-tight-road.toml"],
             "on-a-tight-road.toml: course: tight.toml: ",
@@ -28,6 +28,25 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         (
             &["experiment", "--probe", "9"],
             "--probe = 9 N.m is outside 0 to 0.3 N.m",
+        ),
+        (
+            &[
+                "identify-vehicle",
+                "none.csv",
+                "--mass=1500",
+                "--wheelbase=2.7",
+                "--level",
+                "0.49",
+            ],
+            "'--level <SHARE>': level = 0.49 is outside 0.5 to 0.9999",
+        ),
+        (
+            &["design", "--level", "0.99991"],
+            "level = 0.99991 is outside 0.5 to 0.9999",
+        ),
+        (
+            &["design-guidance", "none.toml", "--level", "95"],
+            "level = 95 is outside 0.5 to 0.9999",
         ),
         (
             &["reliance", "--amplitude", "9"],

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::fit::sensitivity;
 use super::log::{VehicleColumns, VehicleLog};
 use super::model::{Physical, wheel_angle, yaw_rate};
-use super::quantities::{QUANTITIES, STEPS, beforehand};
+use super::quantities::{Errors, QUANTILE_95, QUANTITIES, STEPS, beforehand};
 use super::{Fits, P, Part, with_column};
 
 const RATE_HZ: f64 = 100.0;
@@ -63,10 +63,19 @@ pub struct Manoeuvre {
 pub struct Telling {
     /// The quantity.
     pub name: &'static str,
-    /// Half of its 95 % interval behind record and manoeuvre, as text with its unit.
+    /// Half of its interval behind record and manoeuvre, as text with its unit: of 95 %, if [`Telling::hold_at`] says nothing else.
     pub half_width: String,
     /// Whether it would be identified.
     pub identified: bool,
+    #[serde(skip)]
+    errors: Errors,
+}
+
+impl Telling {
+    /// Takes the interval that reaches so many standard deviations of a normal distribution. What would be identified stays so.
+    pub fn hold_at(&mut self, deviations: f64) {
+        self.half_width = self.errors.half_as_text(deviations);
+    }
 }
 
 /// What each manoeuvre would tell of these quantities; nothing without a fit of the vehicle.
@@ -124,11 +133,11 @@ fn tells(fits: &Fits<'_>, kind: Kind, lacking: &[&str]) -> Option<Vec<Telling>> 
             Part::Column => (column?, of_column.as_ref()?),
         };
         let found = of.known(known, &fit.parameters, covariance, speed);
-        let half = of.half_width(&found);
         Some(Telling {
             name: of.name,
-            half_width: format!("+-{}", of.shown(half)),
+            half_width: found.half_as_text(QUANTILE_95),
             identified: of.lacks(&found).is_none(),
+            errors: found,
         })
     });
     Some(tell.collect())

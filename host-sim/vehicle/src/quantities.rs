@@ -44,8 +44,9 @@ pub(super) const STEPS: [f64; P::ALL] = [
 const SURE: f64 = 1e-5;
 /// The largest share of what was known beforehand that an identified quantity's error may be.
 const MOST_OF_BEFOREHAND: f64 = 1.0 / 3.0;
-/// The normal distribution's quantile of a 95 % interval.
-const QUANTILE_95: f64 = 1.96;
+/// How many standard deviations the interval of 95 % reaches, by which a quantity counts as identified: with the digits that figures are
+/// published with; levels that are asked for are the engine's.
+pub(super) const QUANTILE_95: f64 = 1.96;
 
 /// Which of the two fits tells a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -58,7 +59,7 @@ pub enum Part {
 }
 
 /// How wide half of a 95 % interval may be.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Width {
     /// A part of a value above zero, whose logarithm is normal.
     Share(f64),
@@ -153,14 +154,63 @@ pub struct Quantity {
     pub interval_95: Option<[f64; 2]>,
     /// Why it is not identified; empty otherwise.
     pub why: String,
+    /// What an interval of any level is made of; none where there is no interval.
+    #[serde(skip)]
+    errors: Option<Errors>,
+}
+
+impl Quantity {
+    /// The interval that reaches so many standard deviations of a normal distribution.
+    #[must_use]
+    pub fn interval(&self, deviations: f64) -> Option<[f64; 2]> {
+        self.errors.map(|errors| errors.interval(deviations))
+    }
 }
 
 /// A value with its error, on the scale on which it is normal.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Known95 {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Errors {
     value: f64,
     error: f64,
     beforehand: f64,
+    width: Width,
+    unit: &'static str,
+    /// The least value that the quantity can have.
+    least: f64,
+}
+
+impl Errors {
+    /// The interval that reaches so many standard deviations of a normal distribution.
+    fn interval(&self, deviations: f64) -> [f64; 2] {
+        let half = deviations * self.error;
+        let ends = match self.width {
+            Share(_) => [self.value * (-half).exp(), self.value * half.exp()],
+            Plain(_) => [self.value - half, self.value + half],
+        };
+        ends.map(|end| end.max(self.least))
+    }
+
+    /// Half of that interval, as a share or in the unit.
+    fn half_width(&self, deviations: f64) -> f64 {
+        let half = deviations * self.error;
+        match self.width {
+            Share(_) => half.exp_m1(),
+            Plain(_) => half,
+        }
+    }
+
+    /// That half as text.
+    pub(super) fn half_as_text(&self, deviations: f64) -> String {
+        self.shown(self.half_width(deviations))
+    }
+
+    /// Half of an interval as text.
+    fn shown(&self, half: f64) -> String {
+        match self.width {
+            Share(_) => format!("+-{:.0} %", 100.0 * half),
+            Plain(_) => format!("+-{half:.2e} {}", self.unit),
+        }
+    }
 }
 
 /// Means and variances of what is known beforehand, with what was given.
@@ -195,7 +245,7 @@ impl Definition {
         at: &DVector<f64>,
         covariance: &DMatrix<f64>,
         v: f64,
-    ) -> Known95 {
+    ) -> Errors {
         let value = |x: &DVector<f64>| self.on_scale((self.value)(known, x, v));
         let gradient = DVector::from_fn(at.len(), |i, _| {
             let [mut up, mut down] = [at.clone(), at.clone()];
@@ -205,19 +255,17 @@ impl Definition {
         });
         let before = beforehand(known);
         let prior: f64 = (0..at.len()).map(|i| (gradient[i] * before[i].1).powi(2)).sum();
-        Known95 {
+        Errors {
             value: (self.value)(known, at, v),
             error: gradient.dot(&(covariance * &gradient)).max(0.0).sqrt(),
             beforehand: prior.sqrt(),
-        }
-    }
-
-    /// Half of the interval, as a share or in the unit.
-    pub(super) fn half_width(&self, known: &Known95) -> f64 {
-        let half = QUANTILE_95 * known.error;
-        match self.width {
-            Share(_) => half.exp_m1(),
-            Plain(_) => half,
+            width: self.width,
+            unit: self.unit,
+            least: if self.name == "friction" {
+                0.0
+            } else {
+                f64::NEG_INFINITY
+            },
         }
     }
 
@@ -228,8 +276,7 @@ impl Definition {
     }
 
     /// Why it is not identified; nothing if it is.
-    pub(super) fn lacks(&self, known: &Known95) -> Option<String> {
-        let half = self.half_width(known);
+    pub(super) fn lacks(&self, known: &Errors) -> Option<String> {
         if known.error > MOST_OF_BEFOREHAND * known.beforehand {
             let why = match self.name {
                 "k_f" | "k_r" | "i" | "l_f" => {
@@ -239,21 +286,9 @@ impl Definition {
             };
             return Some(why.into());
         }
-        (half > self.limit()).then(|| {
-            format!(
-                "+-{} where +-{} is wanted",
-                self.shown(half),
-                self.shown(self.limit())
-            )
-        })
-    }
-
-    /// Half of an interval as text.
-    pub(super) fn shown(&self, half: f64) -> String {
-        match self.width {
-            Share(_) => format!("{:.0} %", 100.0 * half),
-            Plain(_) => format!("{half:.2e} {}", self.unit),
-        }
+        let half = known.half_width(QUANTILE_95);
+        let wanted = || known.shown(self.limit());
+        (half > self.limit()).then(|| format!("{} where {} is wanted", known.shown(half), wanted()))
     }
 
     fn is_given(&self, known: &Known) -> bool {
@@ -266,22 +301,13 @@ impl Definition {
     }
 
     /// The result of a fit; `refuted` says what refutes it.
-    pub(super) fn quantity(&self, known: &Known, found: &Known95, refuted: Option<&str>) -> Quantity {
-        let half = QUANTILE_95 * found.error;
-        let interval = match self.width {
-            Share(_) => [found.value * (-half).exp(), found.value * half.exp()],
-            Plain(_) => [found.value - half, found.value + half],
-        };
-        let least = if self.name == "friction" {
-            0.0
-        } else {
-            f64::NEG_INFINITY
-        };
+    pub(super) fn quantity(&self, known: &Known, found: &Errors, refuted: Option<&str>) -> Quantity {
         let error = match self.width {
             Share(_) => found.value * found.error,
             Plain(_) => found.error,
         };
         let given = self.is_given(known);
+        let errors = Some(*found).filter(|_| refuted.is_none() && !given);
         let why = refuted
             .map(String::from)
             .or_else(|| self.lacks(found))
@@ -292,9 +318,10 @@ impl Definition {
                 (_, None) => Verdict::Identified,
                 _ => Verdict::NotIdentified,
             },
-            estimate: why.is_none().then_some(found.value.max(least)),
-            standard_error: Some(error).filter(|_| refuted.is_none() && !given),
-            interval_95: Some(interval.map(|end| end.max(least))).filter(|_| refuted.is_none() && !given),
+            estimate: why.is_none().then_some(found.value.max(found.least)),
+            standard_error: errors.map(|_| error),
+            interval_95: errors.map(|errors| errors.interval(QUANTILE_95)),
+            errors,
             ..self.without_fit(why.unwrap_or_default())
         }
     }
@@ -311,6 +338,7 @@ impl Definition {
             standard_error: None,
             interval_95: None,
             why,
+            errors: None,
         }
     }
 }

@@ -204,7 +204,8 @@ impl Parameter {
     }
 }
 
-/// 97.5 % point of the standard normal distribution.
+/// 97.5 % point of the standard normal distribution, with the digits that estimates are published with; levels that are asked for are the
+/// engine's.
 pub(crate) const STANDARD_NORMAL_95: f64 = 1.959_964;
 
 /// Widest 95 % interval of an identified parameter, as a share of its variation interval.

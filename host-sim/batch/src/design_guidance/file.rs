@@ -14,6 +14,7 @@ use super::{DesignGuidance, Gains, Member, Stage, published};
 use crate::files::{Source, check_names};
 use crate::parts::unknown;
 use crate::places::drives;
+use crate::statistics::Confidence;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -119,6 +120,7 @@ pub(super) fn from_text(
         stretches: file.search.stretch,
         range: range(source, file.search.scales)?,
         bars: bars(source, &file.bars)?,
+        level: Confidence::USUAL,
         identity: named(0, &format!("{text}{share}{courses}")),
         stages,
     };

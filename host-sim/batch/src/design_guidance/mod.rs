@@ -22,6 +22,7 @@ use std::path::Path;
 
 use crate::engine::StudyError;
 use crate::files::Source;
+use crate::statistics::Confidence;
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
 use serde::Serialize;
@@ -82,6 +83,8 @@ pub struct DesignGuidance {
     range: [Gains; 2],
     bars: [f64; BARS.len()],
     identity: u64,
+    /// How often intervals hold.
+    pub level: Confidence,
 }
 
 impl DesignGuidance {

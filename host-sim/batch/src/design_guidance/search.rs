@@ -73,6 +73,9 @@ pub struct Choice {
     pub training: SetRow,
     /// The ratios on the held-out drives, with intervals over the draws of their noise; none where there is one draw.
     pub held_out: [Mean; BARS.len()],
+    /// The ratios with intervals of 95 %, by which a bar is held or missed.
+    #[serde(skip)]
+    pub judged: [Mean; BARS.len()],
     /// Driver by driver there.
     pub drivers: Vec<Figures>,
 }
@@ -92,6 +95,9 @@ pub struct DesignResults {
     pub sets: Vec<SetRow>,
     /// By stretch.
     pub choices: Vec<Choice>,
+    /// How often intervals hold.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
 }
 
 /// Step of the search at its start, in logarithms of gains.
@@ -136,12 +142,13 @@ impl DesignGuidance {
         let published = evaluated(published(), true)?;
         let choice = |stretch: &[f64; 2]| {
             let training = rows[self.best(*stretch, &sets)].clone();
-            let judged = evaluated(training.gains, true)?;
+            let own = evaluated(training.gains, true)?;
             Ok(Choice {
                 stretch: stretch.map(|stretch| stretch.is_finite().then_some(stretch)),
                 training,
-                held_out: self.judged(&judged, &published),
-                drivers: judged.drivers,
+                held_out: self.judged(&own, &published, self.level),
+                judged: self.judged(&own, &published, Confidence::USUAL),
+                drivers: own.drivers,
             })
         };
         let choices = self
@@ -160,6 +167,7 @@ impl DesignGuidance {
             published,
             sets: rows,
             choices,
+            level: self.level,
         })
     }
 
@@ -233,8 +241,8 @@ impl DesignGuidance {
         goals + BEYOND * beyond + f64::from(row.unstable)
     }
 
-    /// The ratios of held-out drives.
-    pub(super) fn judged(&self, set: &Evaluated, paper: &Evaluated) -> [Mean; BARS.len()] {
+    /// The ratios of held-out drives, with intervals of a level.
+    pub(super) fn judged(&self, set: &Evaluated, paper: &Evaluated, level: Confidence) -> [Mean; BARS.len()] {
         let drivers = &self.stages[1].drivers;
         let whole = ratios(&set.drivers, &paper.drivers, drivers);
         let without = |left_out: usize| {
@@ -248,7 +256,7 @@ impl DesignGuidance {
         };
         std::array::from_fn(|bar| {
             let left: Vec<f64> = left.iter().map(|left| left[bar]).collect();
-            Mean::tukey(whole[bar], &left, Confidence::USUAL)
+            Mean::tukey(whole[bar], &left, level)
         })
     }
 

@@ -14,6 +14,8 @@
 
 mod drives;
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 pub use crate::engine::Recorder;
@@ -29,10 +31,11 @@ use haptic_sim::participants::{Participant, PublishedDriver, participant};
 use haptic_sim::scenario::Scenario;
 
 use crate::Away;
-use crate::drivers::identified_driver;
 pub use crate::drivers::{COMPARED, Compared, Probe, compared, truth_of};
+use crate::drivers::{Intervals, identified_driver, intervals};
 use crate::engine::StudyError;
 use crate::engine::{Watch, logs, runs};
+use crate::statistics::Confidence;
 
 /// The paper's trajectory errors with guidance over its participants: smallest, mean, largest, m (4.4).
 pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];
@@ -72,6 +75,21 @@ pub struct Experiment {
     pub published_trajectory_error_m: [f64; 3],
     /// By participant: manual, then guided.
     pub drives: Vec<Drive>,
+    /// How often the intervals of the report hold.
+    #[serde(skip_serializing_if = "Confidence::is_usual")]
+    pub level: Confidence,
+}
+
+impl Experiment {
+    /// Takes intervals of another level. What is called identified stays so: that is a matter of 95 %.
+    pub fn hold_at(&mut self, level: Confidence) {
+        self.level = level;
+        for drive in &mut self.drives {
+            for found in [&mut drive.noise_model, &mut drive.paper] {
+                found.intervals = intervals(&found.identification, level);
+            }
+        }
+    }
 }
 
 /// One drive and what was made of it.
@@ -106,6 +124,9 @@ pub struct Finding {
     /// The identification.
     #[serde(flatten)]
     pub identification: Identification,
+    /// Intervals of the experiment's level, where it is not 95 %: those stand beside each parameter.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub intervals: Intervals,
     /// Trajectory error of the identified driver, m; none if it leaves the road.
     pub trajectory_error_m: Option<f64>,
     /// When the guidance was away while the identified driver drove.
@@ -162,6 +183,7 @@ pub fn experiment(plan: &ExperimentPlan, watch: &Watch<'_>) -> Result<Experiment
                 away,
                 path: again,
                 identification: found.identification,
+                intervals: Intervals::new(),
             })
         };
         let (noise_model, paper) = finding().zip(finding())?;
@@ -184,6 +206,7 @@ pub fn experiment(plan: &ExperimentPlan, watch: &Watch<'_>) -> Result<Experiment
         seed: plan.seed,
         published_trajectory_error_m: PUBLISHED_TRAJECTORY_ERROR_M,
         drives,
+        level: Confidence::USUAL,
     })
 }
 

@@ -32,7 +32,9 @@ fn on_rails(amplitude_rad: f64, side: f64) -> Recording {
 #[test]
 fn the_file_is_a_scenario_with_the_vehicle_that_was_found() {
     let known = Known::new(1200.0, 2.5).unwrap();
-    let mut found = identify(&on_rails(0.1, 1.0), &known, 0.3).unwrap();
+    let mut found = identify(&on_rails(0.1, 1.0), &known, 0.3, Confidence::USUAL)
+        .unwrap()
+        .identification;
     let best = found.best.as_mut().unwrap();
     best.k_t = 0.05;
     (best.k_f, best.k_r) = (60_000.0, 70_000.0);
@@ -77,7 +79,8 @@ fn a_drive_without_excitation_identifies_nothing_of_the_vehicle_and_no_torque_no
     let mut silent = on_rails(0.0, 1.0);
     silent.groups[0].channels[1].values.fill(0.0);
     for recording in [silent, on_rails(1e-6, 1.0)] {
-        nothing_is_told(&identify(&recording, &known, 0.3).unwrap());
+        let found = identify(&recording, &known, 0.3, Confidence::USUAL).unwrap();
+        nothing_is_told(&found.identification);
     }
 }
 
@@ -107,11 +110,15 @@ fn a_wheel_angle_in_degrees_and_one_of_another_sign_are_refused() {
             .values
             .iter_mut()
             .for_each(|angle| *angle *= factor);
-        let error = identify(&recording, &known, 0.3).unwrap_err().to_string();
+        let error = identify(&recording, &known, 0.3, Confidence::USUAL)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(word), "{error}");
     }
     let mut recording = on_rails(0.1, 1.0);
     recording.groups[0].channels.remove(2);
-    let error = identify(&recording, &known, 0.3).unwrap_err().to_string();
+    let error = identify(&recording, &known, 0.3, Confidence::USUAL)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("speed_m_per_s"), "{error}");
 }

@@ -4,6 +4,7 @@ use super::ended;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::identify::{INFORMED, TABLE_4};
+use haptic_batch::Confidence;
 use haptic_batch::design::{Confirmation, Design, DesignResult};
 
 /// The document of the answer.
@@ -83,20 +84,25 @@ fn sentences(answer: &DesignResult) -> Vec<String> {
     }
     if let Some(c) = &answer.confirmation {
         out.push(format!(
-            "Confirmed by {} simulated records of {:.0} s: predicted error {:.4}, RMS error {:.4}; {:.0} % of the 95 % intervals \
+            "Confirmed by {} simulated records of {:.0} s: predicted error {:.4}, RMS error {:.4}; {:.0} % of the {} % intervals \
              hold the truth.",
             c.fits,
             c.length_s,
             c.predicted,
             c.rms,
-            100.0 * c.coverage
+            100.0 * c.coverage,
+            answer.level
         ));
-        out.push(format!("{} is identified in {}.", answer.parameter, named(c)));
+        out.push(format!(
+            "{} is identified in {}.",
+            answer.parameter,
+            named(c, answer.level)
+        ));
         out.push(match &answer.for_most {
             Some(most) => format!(
                 "For 95 % of the drives: {:.1} minutes, which identify it in {}.",
                 most.length_s / 60.0,
-                named(most)
+                named(most, answer.level)
             ),
             None => "No length tried up to half an hour identifies it in 95 % of the drives.".into(),
         });
@@ -105,10 +111,10 @@ fn sentences(answer: &DesignResult) -> Vec<String> {
 }
 
 /// How many fits call the parameter identified.
-fn named(c: &Confirmation) -> String {
+fn named(c: &Confirmation, level: Confidence) -> String {
     let [low, high] = c.identified_share.map(|share| 100.0 * share);
     format!(
-        "{} of {} of them ({low:.0} to {high:.0} %, 95 %)",
+        "{} of {} of them ({low:.0} to {high:.0} %, {level} %)",
         c.identified, c.fits
     )
 }

@@ -14,6 +14,10 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
         true => "the drivers with lines of their own",
         false => "all drivers, as none has a line of its own",
     };
+    let judged = match results.level.is_usual() {
+        true => "",
+        false => " Whether a bar is held is judged by intervals of 95 %.",
+    };
     let choose = vec![
         Block::figure(
             "front",
@@ -22,9 +26,9 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
         ),
         Block::Table(choices(results)),
         Block::Text(format!(
-            "Intervals of 95 % are over {} draws of the noise: the road, the speed and the drivers are those of the file. Effort and conflict are \
-             those of {whose}. Loss x and Others x: how many times as far as its bars allow the search let a set go.",
-            results.stages[1].seeds
+            "Intervals of {} % are over {} draws of the noise: the road, the speed and the drivers are those of the file. Effort and conflict are \
+             those of {whose}. Loss x and Others x: how many times as far as its bars allow the search let a set go.{judged}",
+            results.level, results.stages[1].seeds
         )),
     ];
     let row = vec![
@@ -44,18 +48,18 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
 fn what_holds(results: &DesignResults, choice: &Choice) -> String {
     let bars = &results.bars;
     let is_over = |(ratio, bar): (&f64, &Bar)| *ratio > bar.limit;
-    let is_missed = |(ratio, bar): &(&Mean, &Bar)| is_held(ratio, bar) == Some(false);
     let holding = results
         .sets
         .iter()
         .filter(|set| set.unstable == 0 && !set.ratios.iter().zip(bars).any(is_over));
-    let said = |(ratio, bar): (&Mean, &Bar)| format!("{} {ratio} (at most {})", bar.label, bar.limit);
-    let judged = || choice.held_out.iter().zip(bars);
-    let missed: Vec<String> = judged().filter(is_missed).map(said).collect();
-    let open: Vec<String> = judged()
-        .filter(|(ratio, bar)| is_held(ratio, bar).is_none())
-        .map(said)
-        .collect();
+    let which = |held: Option<bool>| -> Vec<String> {
+        let is = |(place, bar): &(usize, &Bar)| is_held(&choice.judged[*place], bar) == held;
+        let said = |(place, bar): (usize, &Bar)| {
+            format!("{} {} (at most {})", bar.label, choice.held_out[place], bar.limit)
+        };
+        bars.iter().enumerate().filter(is).map(said).collect()
+    };
+    let [missed, open] = [Some(false), None].map(which);
     let search = match holding.count() {
         0 => "The bars cannot be had together with any set that was tried".to_owned(),
         sets => format!("{sets} of the sets tried hold every bar on the drives of the search"),
@@ -161,12 +165,12 @@ fn gains(gains: &Gains) -> String {
 
 fn bars(results: &DesignResults, choice: &Choice) -> Table {
     let row = |(place, bar): (usize, &Bar)| {
-        let held_out = &choice.held_out[place];
-        let is_held = is_held(held_out, bar).map_or("not told", |is| if is { "yes" } else { "no" });
+        let is_held =
+            is_held(&choice.judged[place], bar).map_or("not told", |is| if is { "yes" } else { "no" });
         [
             ("Figure", Cell::text(bar.label)),
             ("At most", Cell::number(bar.limit, 2)),
-            ("Held out", said(held_out)),
+            ("Held out", said(&choice.held_out[place])),
             ("Held", Cell::text(is_held)),
         ]
     };

@@ -102,13 +102,16 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
     }
 }
 
-/// K_hg of every guided drive: the truth, and both estimates with their 95 % intervals.
+/// K_hg of every guided drive: the truth, and both estimates, that of the noise model with its interval.
 fn estimates(experiment: &Experiment) -> Figure {
     let guided = || experiment.drives.iter().filter(|d| d.guided);
     let truth = guided().filter_map(|d| Some((f64::from(d.participant) - ASIDE, d.truth.k_hg?)));
     let found = guided().filter_map(|d| {
         let k_hg = &d.noise_model.identification.parameters.k_hg;
-        Some(((f64::from(d.participant), k_hg.estimate?), k_hg.interval_95?))
+        Some((
+            (f64::from(d.participant), k_hg.estimate?),
+            k_hg.interval(experiment.level.normal())?,
+        ))
     });
     let published = guided().filter_map(|d| {
         let k_hg = &d.paper.identification.parameters.k_hg;
@@ -116,7 +119,7 @@ fn estimates(experiment: &Experiment) -> Figure {
     });
     let panel = Axis::new("K_hg", "-").panel([
         Series::dots("truth", 0, truth.collect()),
-        Series::whiskers("noise model, 95 % interval", 1, found),
+        Series::whiskers(&format!("noise model, {} % interval", experiment.level), 1, found),
         Series::dots("published method", 3, published.collect()),
     ]);
     Axis::counting("Participant").figure([panel])

@@ -165,13 +165,19 @@ fn residuals(found: &Identification) -> Figure {
     over_time(found, panels)
 }
 
-fn correlogram(found: &Identification) -> Figure {
+fn correlogram(found: &Identification, level: Confidence) -> Figure {
     let r = autocorrelation(&found.traces.residual_nm, LAGS);
-    let bound = 1.96 / (found.rows as f64).sqrt();
+    // Two decimals of the quantile, as tables have it: a picture shows no more.
+    let bound = (100.0 * level.normal()).round() / 100.0 / (found.rows as f64).sqrt();
     let last = r.len() as f64;
     let stems = (1..=r.len()).map(|k| k as f64).zip(r).collect();
     let series = vec![
-        Series::interval("95 % if white", 5, &[0.5, last + 0.5], &[[-bound, bound]; 2]),
+        Series::interval(
+            &format!("{level} % if white"),
+            5,
+            &[0.5, last + 0.5],
+            &[[-bound, bound]; 2],
+        ),
         Series::with_mark("", 0, Mark::Stems, stems),
     ];
     let panel = Axis::new("Autocorrelation", "-").panel(series);
@@ -255,7 +261,11 @@ pub fn report(drive: &IdentifiedDrive) -> Report {
     let correlated = "Autocorrelation of the residuals of the loss.";
     let left_over = vec![
         Block::figure("residuals", residuals(found), made_of),
-        Block::figure("autocorrelation", correlogram(found), correlated),
+        Block::figure(
+            "autocorrelation",
+            correlogram(found, drive.results.level),
+            correlated,
+        ),
         Block::Table(input_tests(found)),
     ];
     let by_filter = "The same drive followed by the constrained Kalman filter, for drivers who change.";

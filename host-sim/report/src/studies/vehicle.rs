@@ -1,13 +1,15 @@
 //! What is shown of an identified vehicle.
 
 use crate::document::{Block, Cell, Report, Section, Table};
+use haptic_batch::vehicle::IdentifiedVehicle;
 use haptic_vehicle::{
     Check, MOST_LATERAL_M_PER_S2, Manoeuvre, Part, Quantity, VehicleIdentification, Verdict,
 };
 
 /// The document of an identification.
 #[must_use]
-pub fn report(found: &VehicleIdentification, log: &str) -> Report {
+pub fn report(vehicle: &IdentifiedVehicle, log: &str) -> Report {
+    let found = &vehicle.identification;
     let [least, most] = found.speeds_m_per_s.map(|v| 3.6 * v);
     let percent = |fit: Option<f64>| fit.map_or_else(|| "not fitted".to_owned(), |fit| format!("{fit:.1} %"));
     let summary = format!(
@@ -22,7 +24,7 @@ pub fn report(found: &VehicleIdentification, log: &str) -> Report {
     let mut sections = vec![
         Section::new(
             "Vehicle and column",
-            vec![Block::Table(quantities(found)), Block::Table(reasons(found))],
+            vec![Block::Table(quantities(vehicle)), Block::Table(reasons(found))],
         ),
         Section::new(
             "Checks",
@@ -30,10 +32,7 @@ pub fn report(found: &VehicleIdentification, log: &str) -> Report {
         ),
     ];
     if !found.manoeuvres.is_empty() {
-        sections.push(Section::new(
-            "What would tell the rest",
-            manoeuvres(&found.manoeuvres),
-        ));
+        sections.push(Section::new("What would tell the rest", manoeuvres(vehicle)));
     }
     let assumed = found.assumed.iter().map(|what| vec![Cell::text(what)]);
     sections.push(Section::new(
@@ -57,25 +56,27 @@ fn decimals(value: f64) -> usize {
     places.clamp(0.0, 8.0) as usize
 }
 
-fn quantities(found: &VehicleIdentification) -> Table {
+fn quantities(found: &IdentifiedVehicle) -> Table {
+    let from = format!("{} % from", found.level);
     let row = |q: &Quantity| {
+        let interval = found.interval(q);
         let size = q
             .estimate
             .filter(|value| *value != 0.0)
-            .or(q.interval_95.map(|[low, high]| low.abs().max(high.abs())));
+            .or(interval.map(|[low, high]| low.abs().max(high.abs())));
         let places = decimals(size.unwrap_or(1.0));
-        let [low, high] = Cell::ends(q.interval_95, places);
+        let [low, high] = Cell::ends(interval, places);
         [
             ("", Cell::text(q.name)),
             ("Unit", Cell::text(if q.unit.is_empty() { "-" } else { q.unit })),
             ("Verdict", Cell::text(verdict(q.verdict))),
             ("Estimate", Cell::number(q.estimate, places)),
             ("Standard error", Cell::number(q.standard_error, places + 1)),
-            ("95 % from", low),
+            (&*from, low),
             ("to", high),
         ]
     };
-    Table::of_rows("", found.quantities.iter().map(row))
+    Table::of_rows("", found.identification.quantities.iter().map(row))
 }
 
 fn reasons(found: &VehicleIdentification) -> Table {
@@ -113,10 +114,12 @@ fn check(check: &Check) -> [(&'static str, Cell); 6] {
     ]
 }
 
-fn manoeuvres(all: &[Manoeuvre]) -> Vec<Block> {
+fn manoeuvres(found: &IdentifiedVehicle) -> Vec<Block> {
+    let all: &[Manoeuvre] = &found.identification.manoeuvres;
+    let behind = format!("Half of the {} % interval behind", found.level);
     let names: Vec<&'static str> = all[0].tells.iter().map(|telling| telling.name).collect();
     let row = |name: &'static str| {
-        let mut cells = vec![("Half of the 95 % interval behind", Cell::text(name))];
+        let mut cells = vec![(&*behind, Cell::text(name))];
         for manoeuvre in all {
             let telling = manoeuvre.tells.iter().find(|telling| telling.name == name);
             let text = telling.map(|t| {
