@@ -77,6 +77,12 @@ const STUDIES: Arrows = &[
     ("host-sim/evidence/src", &["availability", "estimates", "handover", "real_drives", "reliance", "vehicle"]),
 ];
 
+/// Modules that use each other.
+const CIRCLES: [&str; 2] = [
+    "host-sim/evidence: estimates::corruptions and estimates::recordings",
+    "host-sim/sim: models::torsion_bar::exact and models::torsion_bar::plant",
+];
+
 /// What only the engine of the studies uses: threads, and runs side by side.
 const ENGINES_OWN: [&str; 2] = ["rayon", "haptic_vectorised"];
 /// Files with runs of two kinds for a case (with the failure and without, with guidance and by hand), which ask the engine's groups for
@@ -311,6 +317,31 @@ fn as_written(arrows: Arrows) -> BTreeMap<String, BTreeSet<String>> {
 #[test]
 fn the_core_has_the_arrows_of_its_table_and_no_others() {
     assert_eq!(arrows("core/src"), as_written(CORE));
+}
+
+/// Two modules that use each other are one. A module and what lies below it are.
+#[test]
+fn no_two_modules_of_a_crate_use_each_other() {
+    let mut circles = BTreeSet::new();
+    for (place, _) in PACKAGES {
+        let named = named(&format!("{place}/src"));
+        let module = |path: &[String]| {
+            let heads = (1..=path.len()).rev().map(|length| path[..length].to_vec());
+            heads.into_iter().find(|head| named.contains_key(head))
+        };
+        let uses = |from: &Vec<String>, to: &Vec<String>| {
+            named[from].iter().any(|path| module(path).as_ref() == Some(to))
+        };
+        for one in named.keys() {
+            let others = named
+                .keys()
+                .filter(|other| one < other && !other.starts_with(one));
+            for other in others.filter(|other| uses(one, other) && uses(other, one)) {
+                circles.insert(format!("{place}: {} and {}", one.join("::"), other.join("::")));
+            }
+        }
+    }
+    assert_eq!(circles, CIRCLES.map(String::from).into());
 }
 
 #[test]
