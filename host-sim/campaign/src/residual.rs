@@ -1,13 +1,15 @@
-//! Decides from when on a fault can be detected: a second implementation of the plausibility checks, in f64 and from
-//! unrounded values.
+//! Decides from when on a fault can be detected: a second implementation of the plausibility checks, in f64, from unrounded values.
 //!
-//! On a straight a frozen lateral error is also the true one. So a reaction can only be required from the moment at
-//! which the inputs contradict each other. This file finds that moment without the core. It compares the change of
-//! the near-point error that speed, yaw error and yaw rate predict with the observed one, and the torques on the
-//! column with its movement, each summed with a time constant of 1 s. Vehicle and margins are those of the documents
-//! (`docs/explanation/plausibility.md`), from table 9. A sample that is further from the last one than a vehicle can
-//! move belongs to another line, whose movements are compared in the same way until it is adopted. If there are only such
-//! samples for four seconds, the fault counts as detected.
+//! On a straight a frozen lateral error is also the true one. So a reaction can only be required from the moment at which the
+//! inputs contradict each other. This file finds that moment without the core: it compares the change of the near-point error
+//! that speed, yaw error and yaw rate predict with the observed one, and the torques on the column with its movement, each
+//! summed with a time constant of 1 s. A sample that is further from the last one than a vehicle can move belongs to another
+//! line, whose movements are compared in the same way until it is adopted; after four seconds of nothing else the fault counts
+//! as detected. Margins are those of `docs/explanation/plausibility.md`, the vehicle that of table 9.
+//!
+//! `core/tests/reference/checks.rs` has the same checks and shares nothing with this: it repeats what the ECU decides, with the
+//! core's rounding, thinned history and doubts of the yaw rate, and says yes or no. Here time is continuous, nothing follows from
+//! what the ECU believes, and the answer is a used share of a margin. What one misreads in the documents the other does not repeat.
 
 use std::collections::VecDeque;
 
