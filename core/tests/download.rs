@@ -3,8 +3,10 @@
 //! Above 500 lines because one transfer has many rules, which the last test states together: split, a reader could not see
 //! which rule lacks its own test.
 
+use std::cell::RefCell;
 use std::num::NonZeroU32;
 
+use crate::cases::cases;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Message, ParameterStatus, WriteOutcome};
 use haptic_core::bus::{Frame, Reject};
@@ -15,8 +17,8 @@ use haptic_core::service::download::{
     Conditions, Download, UNLOCK_MS, frames, mode_for_parameters, unlock, value,
 };
 use haptic_core::service::stored::{Set, Stored};
-use rand::rngs::SmallRng;
-use rand::{RngExt, SeedableRng};
+use proptest::bool::weighted;
+use proptest::prelude::*;
 
 /// Every value is a binary32, so that the bus rounds nothing.
 const SET: Params = Params {
@@ -62,6 +64,16 @@ const READY: Conditions = Conditions {
     settled: true,
     in_use: Some(7),
     now_ms: 0,
+};
+
+const MOVING: Conditions = Conditions {
+    stands: false,
+    ..READY
+};
+
+const UNSETTLED: Conditions = Conditions {
+    settled: false,
+    ..READY
 };
 
 const fn in_mode(mode: Mode) -> Conditions {
@@ -504,15 +516,7 @@ fn the_values_in_use_go_round_in_their_order() {
 /// A refusal takes the permission to write with it, whatever it is for.
 #[test]
 fn an_unlock_is_for_one_attempt() {
-    let moving = Conditions {
-        stands: false,
-        ..READY
-    };
-    let unsettled = Conditions {
-        settled: false,
-        ..READY
-    };
-    for refusing in [moving, unsettled, in_mode(Mode::Active)] {
+    for refusing in [MOVING, UNSETTLED, in_mode(Mode::Active)] {
         let mut download = unlocked();
         let first = frames(&SET)[0];
         assert_eq!(download.receive(&first, &refusing), None);
@@ -534,74 +538,75 @@ fn a_wrong_unlock_locks() {
 /// What may come in any order, against the rules of docs/explanation/monitor-and-memory.md told a second time.
 #[test]
 fn whatever_comes_a_set_is_taken_only_as_the_rules_say() {
-    let rng = &mut SmallRng::seed_from_u64(1);
     let [good, bad] = [SET, Params { k_1: 9.0, ..SET }].map(|params| frames(&params));
-    let mut download = Download::NEW;
-    // The field that comes next, none after a refusal; until when it is unlocked; the values of k_1 of this set.
-    let (mut next, mut until, mut is_bad, mut outcome) = (Some(0), None, false, WriteOutcome::None);
-    let (mut now_ms, mut vehicle, mut in_order) = (u32::MAX - 50_000, 0, 0);
-    let (mut asked, mut began) = (None, 0);
-    let mut counts = [0; 10];
-    for _ in 0..200_000 {
-        // Between two sets there is time, within one there may be too little.
-        let passes_ms = match in_order {
-            0 => rng.random_range(0..800),
-            _ if rng.random_bool(0.004) => rng.random_range(1900..2100),
-            _ => rng.random_range(0..[2, 9][vehicle as usize % 2]),
-        };
-        now_ms = now_ms.wrapping_add(passes_ms);
-        let mut here = Conditions { now_ms, ..READY };
-        match rng.random_range(0..800) {
-            0 => here.mode = Mode::ALL[rng.random_range(0..7)],
-            1 => here.stands = false,
-            2 => here.settled = false,
-            _ => {}
-        }
-        if rng.random_bool(if in_order == 0 { 0.5 } else { 0.002 }) {
-            let in_use = if rng.random_bool(0.8) { 7 } else { 8 };
-            vehicle = rng.random_range(0..1 << 20);
-            assert_eq!(download.receive(&unlock(in_use, vehicle), &here), None);
-            let is_alone = asked.is_none_or(|at| now_ms.wrapping_sub(at) >= 400);
-            asked = Some(now_ms);
-            until = (in_use == 7 && is_alone).then(|| now_ms.wrapping_add(UNLOCK_MS));
-            continue;
-        }
-        let index = if rng.random_bool(0.003) {
-            rng.random_range(0..good.len())
-        } else {
-            in_order
-        };
-        in_order = (index + 1) % good.len();
-        let sends_bad = index == 0 && rng.random_bool(0.2);
-        let taken = download.receive(&[good[index], bad[index]][usize::from(sends_bad)], &here);
-        let mut expected = None;
-        if index == 0 {
-            (next, is_bad, began) = (Some(0), sends_bad, now_ms);
-        }
-        if let Some(due) = next {
-            let is_unlocked = until.is_some_and(|until: u32| until.wrapping_sub(now_ms) <= UNLOCK_MS);
-            outcome = match () {
-                () if here.mode != Mode::Standby => WriteOutcome::NotInStandby,
-                () if !here.stands => WriteOutcome::NotStanding,
-                () if !here.settled => WriteOutcome::TooSoon,
-                () if !is_unlocked => WriteOutcome::NotUnlocked,
-                () if index as u32 > now_ms.wrapping_sub(began) / 4 + 12 => WriteOutcome::TooFast,
-                () if index != due => WriteOutcome::OutOfOrder,
-                () if due + 1 < good.len() => WriteOutcome::Receiving,
-                () if is_bad => WriteOutcome::OutOfRange,
-                () => WriteOutcome::Taken,
-            };
-            expected = (outcome == WriteOutcome::Taken).then_some(Set {
-                params: SET,
-                vehicle: NonZeroU32::new(vehicle),
+    // Between two sets there is time, within one there may be too little.
+    let passes = (0..800_u32, prop_oneof![249 => 0..18_u32, 1 => 1900..2100_u32]);
+    let others = [Mode::ALL.map(in_mode), [MOVING; 7], [UNSETTLED; 7]].concat();
+    let here = prop_oneof![266 => Just(READY), 1 => prop::sample::select(others)];
+    // Where a set ends, and within one where the second is true as well.
+    let unlocks = (weighted(0.5), weighted(0.004), weighted(0.2), 0..1_u32 << 20);
+    let field = (prop::option::weighted(0.003, 0..good.len()), weighted(0.2));
+    let heard = prop::collection::vec((passes, here, unlocks, field), 0..=4000);
+    let counts = RefCell::new([0; 10]);
+    cases(1, 100, &heard, |heard| {
+        let mut download = Download::NEW;
+        // The field that comes next, none after a refusal; until when it is unlocked; the values of k_1 of this set.
+        let (mut next, mut until, mut is_bad, mut outcome) = (Some(0), None, false, WriteOutcome::None);
+        let (mut now_ms, mut vehicle, mut in_order) = (u32::MAX - 20_000, 0, 0);
+        let (mut asked, mut began) = (None, 0);
+        for ((between, within), here, (is_unlock, anywhere, is_other, unlocks), (elsewhere, spoils)) in heard
+        {
+            now_ms = now_ms.wrapping_add(match within {
+                _ if in_order == 0 => between,
+                0..18 => within % [2, 9][vehicle as usize % 2],
+                _ => within,
             });
-            let is_whole = matches!(outcome, WriteOutcome::Taken | WriteOutcome::OutOfRange);
-            let goes_on = outcome == WriteOutcome::Receiving;
-            until = until.filter(|_| goes_on);
-            next = (goes_on || is_whole).then_some(index + 1);
-            counts[outcome as usize] += 1;
+            let here = Conditions { now_ms, ..here };
+            if is_unlock && (in_order == 0 || anywhere) {
+                vehicle = unlocks;
+                prop_assert_eq!(
+                    download.receive(&unlock(7 + u32::from(is_other), vehicle), &here),
+                    None
+                );
+                let is_alone = asked.is_none_or(|at| now_ms.wrapping_sub(at) >= 400);
+                asked = Some(now_ms);
+                until = (!is_other && is_alone).then(|| now_ms.wrapping_add(UNLOCK_MS));
+                continue;
+            }
+            let index = elsewhere.unwrap_or(in_order);
+            in_order = (index + 1) % good.len();
+            let sends_bad = index == 0 && spoils;
+            let taken = download.receive(&[good[index], bad[index]][usize::from(sends_bad)], &here);
+            let mut expected = None;
+            if index == 0 {
+                (next, is_bad, began) = (Some(0), sends_bad, now_ms);
+            }
+            if let Some(due) = next {
+                let is_unlocked = until.is_some_and(|until: u32| until.wrapping_sub(now_ms) <= UNLOCK_MS);
+                outcome = match () {
+                    () if here.mode != Mode::Standby => WriteOutcome::NotInStandby,
+                    () if !here.stands => WriteOutcome::NotStanding,
+                    () if !here.settled => WriteOutcome::TooSoon,
+                    () if !is_unlocked => WriteOutcome::NotUnlocked,
+                    () if index as u32 > now_ms.wrapping_sub(began) / 4 + 12 => WriteOutcome::TooFast,
+                    () if index != due => WriteOutcome::OutOfOrder,
+                    () if due + 1 < good.len() => WriteOutcome::Receiving,
+                    () if is_bad => WriteOutcome::OutOfRange,
+                    () => WriteOutcome::Taken,
+                };
+                expected = (outcome == WriteOutcome::Taken).then_some(Set {
+                    params: SET,
+                    vehicle: NonZeroU32::new(vehicle),
+                });
+                let is_whole = matches!(outcome, WriteOutcome::Taken | WriteOutcome::OutOfRange);
+                let goes_on = outcome == WriteOutcome::Receiving;
+                until = until.filter(|_| goes_on);
+                next = (goes_on || is_whole).then_some(index + 1);
+                counts.borrow_mut()[outcome as usize] += 1;
+            }
+            prop_assert_eq!((taken, download.status(None, false).outcome), (expected, outcome));
         }
-        assert_eq!((taken, download.status(None, false).outcome), (expected, outcome));
-    }
-    assert!(counts[1..].iter().all(|count| *count > 20), "{counts:?}");
+        Ok(())
+    });
+    assert!(counts.borrow()[1..].iter().all(|count| *count > 20), "{counts:?}");
 }

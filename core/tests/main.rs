@@ -2,6 +2,7 @@
 
 mod another_law;
 mod attacks;
+mod cases;
 mod coast;
 mod column;
 mod dbc;

@@ -1,8 +1,8 @@
 //! Quantities as counts of a converter and back, by hand.
 
+use crate::cases::cases;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Torque};
-use rand::rngs::SmallRng;
-use rand::{RngExt, SeedableRng};
+use proptest::prelude::*;
 
 #[test]
 fn counts_become_quantities_and_saturate() {
@@ -40,31 +40,27 @@ fn quantities_become_counts_toward_zero() {
 /// All that quantities do, against whole numbers of 64 bits: sums, differences, magnitudes and products saturate on both sides.
 #[test]
 fn what_quantities_do_is_what_whole_numbers_do() {
-    let rng = &mut SmallRng::seed_from_u64(1);
     let of = |counts: i64| counts.clamp(i32::MIN.into(), i32::MAX.into());
-    let edges = [i32::MIN, i32::MIN + 1, -1, 0, 1, i32::MAX - 1, i32::MAX];
-    let mut counts = || match rng.random_range(0..4) {
-        0 => edges[rng.random_range(0..edges.len())],
-        _ => rng.random::<i32>() >> rng.random_range(0..31),
+    let counts = || {
+        let edges = prop::sample::select(&[i32::MIN, i32::MIN + 1, -1, 0, 1, i32::MAX - 1, i32::MAX]);
+        prop_oneof![1 => edges, 3 => (any::<i32>(), 0..31).prop_map(|(counts, less)| counts >> less)]
     };
     // Exact: a count is 2^-24.
     let quantity = |counts: i32| Metres::from_m(f64::from(counts) / 16_777_216.0);
     let in_counts = |quantity: Metres| (quantity.m() * 16_777_216.0) as i64;
-    for _ in 0..100_000 {
-        let (a, b, times) = (counts(), counts(), counts() >> 16);
-        let ([x, y], [a, b]) = ([a, b].map(quantity), [a, b].map(i64::from));
-        assert_eq!(in_counts(x), a);
-        assert_eq!(in_counts(x.plus(y)), of(a + b));
-        assert_eq!(in_counts(x.minus(y)), of(a - b));
-        assert_eq!(in_counts(x.opposite()), of(-a));
-        assert_eq!(in_counts(x.abs()), of(a.abs()));
-        assert_eq!(in_counts(x.times(times)), of(a * i64::from(times)));
-        assert_eq!(
-            i64::from(x.count_of(y.abs())),
-            of(a / b.abs().clamp(1, i64::from(i32::MAX)))
-        );
-        assert_eq!(x.to_f32(), a as f32 / 16_777_216.0);
-    }
+    cases(1, 100_000, &(counts(), counts(), counts()), |(a, b, times)| {
+        let (times, [x, y], [a, b]) = (times >> 16, [a, b].map(quantity), [a, b].map(i64::from));
+        prop_assert_eq!(in_counts(x), a);
+        prop_assert_eq!(in_counts(x.plus(y)), of(a + b));
+        prop_assert_eq!(in_counts(x.minus(y)), of(a - b));
+        prop_assert_eq!(in_counts(x.opposite()), of(-a));
+        prop_assert_eq!(in_counts(x.abs()), of(a.abs()));
+        prop_assert_eq!(in_counts(x.times(times)), of(a * i64::from(times)));
+        let least = b.abs().clamp(1, i64::from(i32::MAX));
+        prop_assert_eq!(i64::from(x.count_of(y.abs())), of(a / least));
+        prop_assert_eq!(x.to_f32(), a as f32 / 16_777_216.0);
+        Ok(())
+    });
     assert_eq!(
         [Metres::MIN, Metres::MAX].map(in_counts),
         [i32::MIN, i32::MAX].map(i64::from)

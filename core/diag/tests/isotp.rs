@@ -1,7 +1,11 @@
-use crate::rig::inputs;
+use std::cell::Cell;
+
 use haptic_diag::isotp::{Bytes, Link};
-use rand::rngs::SmallRng;
-use rand::{RngExt, SeedableRng};
+use proptest::bool::weighted;
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+use crate::cases::cases;
 
 type Small = Link<40, 100>;
 
@@ -226,15 +230,13 @@ fn a_message_without_a_place_is_not_begun() {
 /// Two ends, and a bus that now and then loses a frame: what arrives is what was sent, or nothing.
 #[test]
 fn two_ends_on_a_bus_that_loses_frames_tell_nothing_false() {
-    let mut random = SmallRng::seed_from_u64(47);
-    let (mut whole, mut lost) = (0, 0);
-    for round in 0..2000_u32 {
+    let counts = [0, 0].map(Cell::new);
+    // Of the frames in their order; there are 34 at most.
+    let sent = (vec(any::<u8>(), 1..=200), vec(weighted(0.05), 0..=34));
+    cases(47, 2000, &sent, |(message, losses)| {
         let (mut one, mut other) = (Link::<200, 200>::NEW, Link::<200, 200>::NEW);
-        let length = random.random_range(1..=200);
-        let message: Vec<u8> = (0..length).map(|_| random.random()).collect();
-        assert!(one.send(&message));
-        let loss = if round % 2 == 0 { 0.0 } else { 0.05 };
-        let mut is_lost = false;
+        prop_assert!(one.send(&message));
+        let (mut losses, mut is_lost) = (losses.into_iter(), false);
         for now in 0..3000 {
             for is_forth in [true, false] {
                 let (from, to) = if is_forth {
@@ -242,59 +244,56 @@ fn two_ends_on_a_bus_that_loses_frames_tell_nothing_false() {
                 } else {
                     (&mut other, &mut one)
                 };
-                if let Some(frame) = next(from, now) {
-                    if random.random_bool(loss) {
-                        is_lost = true;
-                    } else {
-                        to.receive(&frame, now);
-                    }
+                match next(from, now) {
+                    Some(_) if losses.next() == Some(true) => is_lost = true,
+                    Some(frame) => to.receive(&frame, now),
+                    None => {}
                 }
             }
             if !one.is_sending() && other.message().is_some() {
                 break;
             }
         }
-        match other.message() {
-            Some(got) => {
-                assert_eq!(
-                    (got.bytes, usize::from(got.length)),
-                    (&message[..], message.len())
-                );
-                whole += 1;
-            }
-            None => {
-                assert!(is_lost);
-                lost += 1;
-            }
-        }
-        assert!(!one.is_sending(), "given up or done");
-    }
+        let got = other.message().map(|got| (got.bytes, usize::from(got.length)));
+        prop_assert!(
+            got.is_none_or(|got| got == (&message[..], message.len())),
+            "{got:?}"
+        );
+        prop_assert!(got.is_some() || is_lost);
+        prop_assert!(!one.is_sending(), "given up or done");
+        counts[usize::from(got.is_none())].update(|count| count + 1);
+        Ok(())
+    });
+    let [whole, lost] = counts.map(Cell::into_inner);
     assert!(whole >= 1000 && lost > 100, "{whole} whole, {lost} lost");
 }
 
 /// Anything at all: no panic, no message longer than it says, and at most a frame for each that came, but flow control.
 #[test]
 fn noise_makes_no_panic() {
-    let mut random = SmallRng::seed_from_u64(4747);
-    let mut link = Small::NEW;
-    let mut now = u32::MAX - 100_000;
-    let mut messages = 0;
-    for _ in 0..inputs(300_000) {
-        let mut data: Vec<u8> = (0..random.random_range(0..=8)).map(|_| random.random()).collect();
-        if let (Some(head), true) = (data.first_mut(), random.random_bool(0.7)) {
-            *head &= 0x33;
+    let data = (vec(any::<u8>(), 0..=8), weighted(0.7));
+    let heard = vec((data, 0..3_u32, weighted(0.1)), 0..=20_000);
+    let messages = Cell::new(0);
+    cases(4747, 30, &heard, |heard| {
+        let (mut link, mut now) = (Small::NEW, u32::MAX - 5000);
+        for ((mut data, is_near), passes, sends) in heard {
+            if let (Some(head), true) = (data.first_mut(), is_near) {
+                *head &= 0x33;
+            }
+            link.receive(&data, now);
+            now = now.wrapping_add(passes);
+            if sends {
+                link.send(&data);
+            }
+            next(&mut link, now);
+            if let Some(message) = link.message() {
+                let length = message.bytes.len();
+                prop_assert!(length <= 40 && length <= usize::from(message.length));
+                messages.update(|count| count + 1);
+                link.done();
+            }
         }
-        link.receive(&data, now);
-        now = now.wrapping_add(random.random_range(0..3));
-        if random.random_bool(0.1) {
-            link.send(&data);
-        }
-        next(&mut link, now);
-        if let Some(message) = link.message() {
-            assert!(message.bytes.len() <= 40 && message.bytes.len() <= usize::from(message.length));
-            messages += 1;
-            link.done();
-        }
-    }
-    assert!(messages > 1000, "{messages}");
+        Ok(())
+    });
+    assert!(messages.get() > 1000, "{messages:?}");
 }

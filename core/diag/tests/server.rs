@@ -1,3 +1,4 @@
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 
 use haptic_core::bus::messages::{Column, Message, Vehicle};
@@ -9,10 +10,12 @@ use haptic_core::service::stored::{self, Set};
 use haptic_diag::data::{PARAMETERS_AT, entries};
 use haptic_diag::server::{SESSION_MS, STORED_LAYOUT};
 use haptic_diag::trouble::{EMPTY, code_of};
-use rand::rngs::SmallRng;
-use rand::{RngExt, SeedableRng};
+use proptest::bool::weighted;
+use proptest::collection::vec;
+use proptest::prelude::*;
 
-use crate::rig::{KEY, Rig, inputs};
+use crate::cases::cases;
+use crate::rig::{KEY, Rig};
 
 /// C1111, of OwnIdentifier, which is number 17 of the list.
 const OWN_IDENTIFIER: [u8; 3] = [0x51, 0x11, 0x00];
@@ -207,15 +210,13 @@ fn a_spoiled_cell_is_empty() {
             assert_eq!(stored(cells), 0, "bit {bit} of word {word}");
         }
     }
-    let mut random = SmallRng::seed_from_u64(1);
-    for _ in 0..100 {
+    let noise = vec(any::<u32>(), EMPTY.as_flattened().len());
+    cases(1, 100, &noise, |noise| {
         let mut cells = EMPTY;
-        cells
-            .as_flattened_mut()
-            .iter_mut()
-            .for_each(|word| *word = random.random());
-        assert_eq!(stored(cells), 0);
-    }
+        cells.as_flattened_mut().copy_from_slice(&noise);
+        prop_assert_eq!(stored(cells), 0);
+        Ok(())
+    });
 }
 
 #[test]
@@ -241,27 +242,25 @@ fn a_reset_is_for_who_proved_himself_beside_a_vehicle_that_stands() {
 /// Anything at all from a bus: no panic, and nothing is written or reset.
 #[test]
 fn noise_unlocks_nothing() {
-    let mut random = SmallRng::seed_from_u64(47);
-    let mut rig = Rig::new();
-    let services = [0x10, 0x11, 0x14, 0x19, 0x22, 0x27, 0x2E, 0x31, 0x3E, 0x85];
-    let mut answers = BTreeSet::new();
-    for _ in 0..inputs(200_000) {
-        let mut data: Vec<u8> = (0..random.random_range(0..=8)).map(|_| random.random()).collect();
-        if let [head, service, ..] = &mut data[..]
-            && random.random_bool(0.8)
-        {
-            *head = random.random_range(0..8);
-            *service = services[random.random_range(0..services.len())];
-            if let Some(sub) = data.get_mut(2) {
-                *sub &= 0x83;
+    let services = prop::sample::select(&[0x10_u8, 0x11, 0x14, 0x19, 0x22, 0x27, 0x2E, 0x31, 0x3E, 0x85]);
+    let request = (weighted(0.8), 0..8_u8, services);
+    // Up to 20 seconds, which is longer than a session and the wait for another proof.
+    let heard = vec((vec(any::<u8>(), 0..=8), request, any::<u32>()), 0..=20_000);
+    let answers = RefCell::new(BTreeSet::new());
+    cases(47, 20, &heard, |heard| {
+        let mut rig = Rig::new();
+        for (mut data, (is_near, length, service), faults) in heard {
+            if let ([head, of, rest @ ..], true) = (&mut data[..], is_near) {
+                (*head, *of) = (length, service);
+                rest.iter_mut().take(1).for_each(|sub| *sub &= 0x83);
             }
+            rig.say(&data);
+            answers.borrow_mut().extend(rig.step().map(|frame| frame[1]));
+            rig.command.faults = FaultSet::from_bits(faults);
+            prop_assert!(!rig.is_reset && rig.set.is_none());
         }
-        rig.say(&data);
-        if let Some(frame) = rig.step() {
-            answers.insert(frame[1]);
-        }
-        rig.command.faults = FaultSet::from_bits(random.random());
-    }
-    assert!(!rig.is_reset && rig.set.is_none());
+        Ok(())
+    });
+    let answers = answers.into_inner();
     assert!(answers.len() > 8, "{answers:02X?}");
 }

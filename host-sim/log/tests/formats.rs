@@ -2,12 +2,17 @@
 
 #![cfg(feature = "formats")]
 
+use std::cell::Cell;
 use std::path::Path;
 
 use haptic_log::bus::{BusFrame, Form};
 use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
 use haptic_log::notes::Notes;
 use haptic_log::recording::{Group, Recording, Series};
+use proptest::prelude::*;
+
+#[path = "../../../core/tests/cases.rs"]
+mod cases;
 
 fn series(name: &str, unit: &str, values: impl Iterator<Item = f64>) -> Series {
     Series {
@@ -168,43 +173,31 @@ fn no_even_grid_spans_a_clock_that_was_set() {
 /// sentence.
 #[test]
 fn a_damaged_file_is_read_or_refused_in_one_sentence() {
-    let mut state = 1_u64;
-    let mut random = move |below: usize| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % below
-    };
-    let mut refused = 0;
+    let refused = Cell::new(0);
     for extension in TABLES.iter().chain(BUSES) {
         let whole = written(extension);
-        let mut files: Vec<Vec<u8>> = (0..whole.len().min(3000))
-            .step_by(10)
-            .map(|length| whole[..length].to_vec())
-            .collect();
-        for _ in 0..1200 {
-            let mut bytes = whole.clone();
-            let near = if random(2) == 0 {
-                bytes.len()
-            } else {
-                bytes.len().min(600)
-            };
-            for _ in 0..=random(4) {
-                let value = [0, 1, 0x7F, 0xFF, random(256) as u8][random(5)];
-                let at = random(near);
-                bytes[at] = value;
-            }
-            files.push(bytes);
-        }
-        for bytes in files {
+        let is_judged = |bytes: Vec<u8>| {
             if let Err(sentence) = read(bytes, extension) {
-                refused += 1;
-                assert!(
-                    !sentence.is_empty() && !sentence.contains('\n'),
-                    "{extension}: {sentence:?}"
-                );
+                refused.update(|count| count + 1);
+                prop_assert!(!sentence.is_empty() && !sentence.contains('\n'), "{sentence:?}");
             }
+            Ok(())
+        };
+        for length in (0..whole.len().min(3000)).step_by(10) {
+            is_judged(whole[..length].to_vec()).unwrap();
         }
+        let value = || prop_oneof![4 => prop::sample::select(&[0_u8, 1, 0x7F, 0xFF]), 1 => any::<u8>()];
+        let damage = |below: usize| prop::collection::vec((0..below, value()), 1..=4);
+        let damages = prop_oneof![damage(whole.len()), damage(whole.len().min(600))];
+        println!("{extension}:");
+        cases::cases(1, 1200, &damages, |damages| {
+            let mut bytes = whole.clone();
+            damages.into_iter().for_each(|(at, value)| bytes[at] = value);
+            is_judged(bytes)
+        });
     }
-    assert!(refused > 1000, "only {refused} files were found to be damaged");
+    assert!(
+        refused.get() > 1000,
+        "only {refused:?} files were found to be damaged"
+    );
 }

@@ -21,13 +21,6 @@ pub(crate) const KEY: Key = [
 const ASK: u16 = 0x730;
 const ANSWER: u16 = 0x738;
 
-/// Inputs of a test with noise: `usual`, or HAPTIC_FUZZ_INPUTS of them.
-pub(crate) fn inputs(usual: u64) -> u64 {
-    std::env::var("HAPTIC_FUZZ_INPUTS").map_or(usual, |text| {
-        text.parse().expect("HAPTIC_FUZZ_INPUTS is a number")
-    })
-}
-
 pub(crate) struct Rig {
     pub(crate) server: Server,
     pub(crate) cells: Cells,
