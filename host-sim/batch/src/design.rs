@@ -15,10 +15,8 @@ use serde::Serialize;
 
 use crate::Away;
 use crate::drivers::{Probe, compared, guided_drive, truth_of};
-use crate::engine::recorded;
-use crate::engine::{StudyError, refuse};
-use crate::engine::{Watch, each, logs};
-use crate::statistics::{Confidence, mean, rms, wilson};
+use crate::engine::{StudyError, Watch, each, logs, recorded, refuse};
+use crate::statistics::{Confidence, halved_by_ratio, mean, rms, wilson};
 
 /// The drives, courses and probes to choose from, and the error to reach.
 #[derive(Debug, Clone)]
@@ -315,18 +313,11 @@ fn needed(request: &DesignRequest, place: usize, all: &[Information]) -> Option<
         let errors = lasting.map(|i| i.standard_errors(request.t_nms_known)[place]);
         rms(errors).unwrap_or(f64::NAN)
     };
-    let (mut low, mut high) = (1.0, 1e6);
-    if error(high).is_nan() || error(high) > request.error {
+    let ends = [1.0, 1e6];
+    if error(ends[1]).is_nan() || error(ends[1]) > request.error {
         return None;
     }
-    for _ in 0..60 {
-        let middle = f64::sqrt(low * high);
-        if error(middle) > request.error {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let [_, high] = halved_by_ratio(ends, 60, |span_s| error(span_s) > request.error);
     Some(high)
 }
 

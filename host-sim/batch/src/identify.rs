@@ -6,8 +6,7 @@ use super::RunRecord;
 use super::record::default_window;
 pub use crate::drivers::Intervals;
 use crate::drivers::{identified_driver, intervals};
-use crate::engine::StudyError;
-use crate::engine::{Watch, each};
+use crate::engine::{StudyError, Watch, each};
 use crate::several::{Difference, Population, differences, population};
 use crate::statistics::Confidence;
 use haptic_analysis::identify::{

@@ -7,6 +7,7 @@ use haptic_sim::simulation::DIVERGED_M;
 use serde::Serialize;
 
 use crate::engine::After;
+use crate::record::probe_hz;
 use crate::statistics::mean;
 
 /// A figure that laws are compared by.
@@ -83,12 +84,6 @@ pub(crate) fn measured(
         probe_hz: probe_hz(scenario),
     };
     values(&measure(trace, &circumstances), off_road, failed)
-}
-
-/// Frequency of a scenario's probe, if it is on.
-pub(crate) fn probe_hz(scenario: &Scenario) -> Option<f64> {
-    let guidance = scenario.guidance();
-    guidance.probe.then_some(guidance.controller.probe_frequency_hz)
 }
 
 fn values(metrics: &Metrics, off_road: bool, failed: &[After]) -> [Option<f64>; METRICS.len()] {

@@ -81,7 +81,7 @@ impl RunRecord {
 }
 
 /// Frequency of the probe, if it is on, Hz.
-fn probe_hz(scenario: &Scenario) -> Option<f64> {
+pub(crate) fn probe_hz(scenario: &Scenario) -> Option<f64> {
     let guidance = scenario.guidance();
     (guidance.probe && scenario.condition() != Condition::Manual)
         .then_some(guidance.controller.probe_frequency_hz)

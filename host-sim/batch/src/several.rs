@@ -16,7 +16,7 @@ use statrs::function::erf::erfc;
 
 use haptic_analysis::identify::{Identification, Parameter};
 
-use crate::statistics::{Confidence, Held, halved};
+use crate::statistics::{Confidence, Held, extent, halved};
 
 /// One parameter of two drivers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -195,11 +195,7 @@ fn weighed(values: &[(f64, f64)], variance: f64) -> (f64, f64, f64) {
 
 /// A variance that is surely too large.
 fn largest(values: &[(f64, f64)]) -> f64 {
-    let (low, high) = values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-            (a.min(v.0), b.max(v.0))
-        });
+    let [low, high] = extent(values.iter().map(|v| v.0));
     1e4 * (high - low).powi(2) + 1e-12
 }
 

@@ -15,8 +15,7 @@ use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Scenario};
 use haptic_sim::simulation::Run;
 
 use crate::Away;
-use crate::engine::StudyError;
-use crate::engine::{Watch, each, runs};
+use crate::engine::{StudyError, Watch, each, runs};
 use crate::paper::stretched_curve;
 use crate::record::{check_rigid, growth, peak_m};
 

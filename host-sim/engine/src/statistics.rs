@@ -20,6 +20,13 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     mean(values.into_iter().map(|value| value * value)).map(f64::sqrt)
 }
 
+/// The smallest and the largest value.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    let values = values.into_iter();
+    values.fold(none, |[low, high], value| [low.min(value), high.max(value)])
+}
+
 /// How often an interval holds what is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Confidence(f64);
@@ -317,6 +324,15 @@ pub fn halved([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn(f64) -
         *if holds(middle) { &mut low } else { &mut high } = middle;
     }
     high
+}
+
+/// Likewise with the span of the logarithms: the last value found at which it holds, and the first at which it does not.
+pub fn halved_by_ratio([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn(f64) -> bool) -> [f64; 2] {
+    for _ in 0..times {
+        let middle = (low * high).sqrt();
+        *if holds(middle) { &mut low } else { &mut high } = middle;
+    }
+    [low, high]
 }
 
 /// The places of points that no other point beats: none is at most as large in everything, and smaller in something.

@@ -7,8 +7,7 @@ use haptic_sim::parts::Driver as _;
 use haptic_sim::scenario::{Failure, FailureKind};
 
 use super::Adaptation;
-use crate::engine::StudyError;
-use crate::engine::trunk;
+use crate::engine::{StudyError, trunk};
 use crate::places::seed_of;
 
 /// So slowly trust follows where K_hg is held, s: by less than 0.001 in a drive.

@@ -4,6 +4,8 @@ use std::f64::consts::PI;
 
 use serde::Serialize;
 
+use crate::statistics::halved_by_ratio;
+
 /// The largest slope in size between neighbours, over what of a stretch of x they cover; 0 of fewer than two points.
 pub fn steepest(points: &[(f64, f64)], [low, high]: [f64; 2]) -> f64 {
     let pairs = points.iter().zip(points.iter().skip(1));
@@ -52,19 +54,12 @@ pub fn of_series(values: &[f64]) -> Swing {
 /// 1 + (w*lag)^2, is 1. With a positive product a loop does not swing: beyond 1 it leaves its equilibrium.
 pub fn swings(lags_s: &[f64], delay_s: f64) -> Option<[f64; 2]> {
     let phase = |w: f64| lags_s.iter().map(|lag| (w * lag).atan()).sum::<f64>() + w * delay_s;
-    let (mut low, mut high) = (1e-6_f64, 1e3_f64);
-    if phase(high) < PI {
+    let ends = [1e-6, 1e3];
+    if phase(ends[1]) < PI {
         return None;
     }
-    // Halves the span of the logarithms: 60 times is far below the digits of f64.
-    for _ in 0..60 {
-        let middle = (low * high).sqrt();
-        if phase(middle) < PI {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    // 60 times is far below the digits of f64.
+    let [low, _] = halved_by_ratio(ends, 60, |w| phase(w) < PI);
     let product = lags_s
         .iter()
         .map(|lag| (1.0 + (low * lag).powi(2)).sqrt())

@@ -27,11 +27,10 @@ use haptic_sim::input::InputError;
 use haptic_sim::laws::Law;
 use serde::Serialize;
 
-use crate::engine::StudyError;
-use crate::engine::{Watch, each};
+use crate::engine::{StudyError, Watch, each};
 use crate::files::Source;
 use crate::parts::{Chosen, Kinds};
-use crate::statistics::{Confidence, Mean, mean};
+use crate::statistics::{Confidence, Mean, extent, mean};
 pub use drive::Seen;
 use drive::{Driven, Job, What};
 pub use linear::{Swing, of_series, steepest, swings};
@@ -332,12 +331,7 @@ impl<'k> Adaptation<'k> {
             .filter_map(|point| Some((point.k_hg, point.k_1?.mean)))
             .collect();
         let law_slope = steepest(&points, [f64::NEG_INFINITY, f64::INFINITY]);
-        let reach = points
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| {
-                [low.min(p.1), high.max(p.1)]
-            });
-        let driver_slope = driver_slope(driver, reach);
+        let driver_slope = driver_slope(driver, extent(points.iter().map(|point| point.1)));
         let alone = |figure: f64| Mean::tukey(figure, &[], self.level);
         let swings: Vec<_> = (own.iter())
             .map(|drive| of_series(&drive.within([settles_s, lost_at_s], |seen| seen.k_1)))

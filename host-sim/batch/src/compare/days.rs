@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::{Compare, Set, StudyError, Watch, each, pairs};
 use crate::engine::{drive_forked, trunk};
-use crate::metrics::probe_hz;
 use crate::places::{Drives, seed_of};
+use crate::record::probe_hz;
 use crate::statistics::mean;
 
 /// Where a driver stands behind his days.

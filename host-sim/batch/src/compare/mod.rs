@@ -26,8 +26,7 @@ use haptic_sim::drivers::AnyDriver;
 use haptic_sim::input::InputError;
 use haptic_sim::laws::Law;
 
-use crate::engine::StudyError;
-use crate::engine::{Watch, each};
+use crate::engine::{StudyError, Watch, each};
 use crate::files::Source;
 use crate::places::{Drives, seed_of};
 use crate::statistics::Confidence;

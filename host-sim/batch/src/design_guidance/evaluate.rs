@@ -9,8 +9,7 @@ use haptic_sim::simulation::{DIVERGED_M, Run};
 use serde::{Deserialize, Serialize};
 
 use super::{DesignGuidance, Gains, Member, Stage, published};
-use crate::engine::StudyError;
-use crate::engine::{Faults, Watch, failures, runs};
+use crate::engine::{Faults, StudyError, Watch, failures, runs};
 use crate::metrics::measured;
 use crate::places::seed_of;
 use crate::record::{check_rigid, growth};

@@ -6,8 +6,7 @@ use serde::Serialize;
 
 use super::evaluate::{CONFLICT, EFFORT, LOSS, NOISE, PEAK};
 use super::{DesignGuidance, Evaluated, Figures, Gains, Member, Stage, published};
-use crate::engine::StudyError;
-use crate::engine::Watch;
+use crate::engine::{StudyError, Watch};
 use crate::statistics::{Confidence, Mean, front, mean};
 
 /// What a set is held to: a figure over that of the paper's gains.

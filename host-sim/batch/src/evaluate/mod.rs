@@ -9,8 +9,7 @@ pub use crate::paper::DRIVERS_T_P;
 pub use results::EvaluationResults;
 
 use crate::RunRecord;
-use crate::engine::StudyError;
-use crate::engine::{Watch, runs};
+use crate::engine::{StudyError, Watch, runs};
 use crate::record::{check_window, default_window, failure_notes, nominal_peak_m};
 use haptic_metrics::Window;
 use haptic_sim::models::driver::DriverParameters;

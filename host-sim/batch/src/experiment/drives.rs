@@ -8,8 +8,7 @@ use haptic_sim::simulation::Run;
 
 use super::{ExperimentPlan, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, chosen, path_of};
 use crate::Away;
-use crate::engine::StudyError;
-use crate::engine::recorded;
+use crate::engine::{StudyError, recorded};
 
 /// A drive with what is needed to judge it.
 pub struct Driven {
@@ -71,17 +70,26 @@ pub fn scenario_of_drive(
         .seed
         .wrapping_mul(1000)
         .wrapping_add(u64::from(2 * number) + u64::from(guided));
-    let scenario = scenario_of(plan, truth, seed)?;
-    let remnant_sd_nm = if guided {
-        REMNANT_GUIDED_NM
-    } else {
-        REMNANT_MANUAL_NM
+    let (condition, remnant_sd_nm) = match truth.k_hg {
+        Some(_) => (Condition::Custom, REMNANT_GUIDED_NM),
+        None => (Condition::Manual, REMNANT_MANUAL_NM),
     };
+    let mut guidance = GuidanceParameters::default();
+    if plan.probe_nm != 0.0 && guided {
+        guidance.probe = true;
+        guidance.controller.probe_amplitude_nm = plan.probe_nm;
+    }
     let driver = DriverParameters {
         remnant_sd_nm,
         ..driver
     };
-    Ok(scenario.to_builder().driver(driver).build()?)
+    let scenario = Scenario::builder()
+        .driver(driver)
+        .condition(condition)
+        .gains(truth.gains())
+        .guidance(guidance)
+        .seed(seed);
+    Ok(scenario.build()?)
 }
 
 impl Driven {
@@ -98,26 +106,6 @@ impl Driven {
         let (run, log) = recorded(scenario);
         Self::new(scenario, &run, log)
     }
-}
-
-/// The drive of a published driver, without remnant.
-fn scenario_of(plan: &ExperimentPlan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, StudyError> {
-    let condition = match driver.k_hg {
-        Some(_) => Condition::Custom,
-        None => Condition::Manual,
-    };
-    let mut guidance = GuidanceParameters::default();
-    if plan.probe_nm != 0.0 && condition != Condition::Manual {
-        guidance.probe = true;
-        guidance.controller.probe_amplitude_nm = plan.probe_nm;
-    }
-    let scenario = Scenario::builder()
-        .driver(driver.parameters())
-        .condition(condition)
-        .gains(driver.gains())
-        .guidance(guidance)
-        .seed(seed);
-    Ok(scenario.build()?)
 }
 
 #[cfg(test)]

@@ -33,8 +33,7 @@ use haptic_sim::scenario::Scenario;
 use crate::Away;
 pub use crate::drivers::{COMPARED, Compared, Probe, compared, truth_of};
 use crate::drivers::{Intervals, identified_driver, intervals};
-use crate::engine::StudyError;
-use crate::engine::{Watch, logs, runs};
+use crate::engine::{StudyError, Watch, logs, runs};
 use crate::statistics::Confidence;
 
 /// The paper's trajectory errors with guidance over its participants: smallest, mean, largest, m (4.4).

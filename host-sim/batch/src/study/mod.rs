@@ -29,12 +29,10 @@ pub use order::Order;
 pub use paired::{Difference, of_participants};
 pub use repeated::{Repeated, Test};
 
-use crate::engine::{StudyError, refuse};
-use crate::engine::{Watch, each, runs};
-use crate::files;
-use crate::left_by_themselves;
+use crate::engine::{StudyError, Watch, each, refuse, runs};
 use crate::record::RunRecord;
 use crate::statistics::Confidence;
+use crate::{files, left_by_themselves};
 
 /// A study, checked.
 #[derive(Debug, Clone)]

@@ -3,9 +3,8 @@
 //! `sessions/PARTICIPANT/POSITION-CONDITION/` holds `session.toml` (who, what, when in the order, version, seed), `scenario.toml`
 //! (whole) and `drive.csv` (what was recorded).
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use haptic_log::trace::{Sample, Trace};
 use haptic_sim::input::{InputError, parse_toml};

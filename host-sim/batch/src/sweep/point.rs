@@ -7,8 +7,7 @@ use toml::{Table, Value};
 
 use super::axis::Kind;
 use super::{Design, DesignPoint, MOST_DRIVES, SLICES, Sweep, value};
-use crate::engine::StudyError;
-use crate::engine::{number, text};
+use crate::engine::{StudyError, number, text};
 
 impl Sweep {
     /// What is varied in a drive. Repeats follow each other, then the grid (its last axis first), then the mixtures of

@@ -7,8 +7,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::groups::Moments;
 use super::{Chunk, Store, Sweep};
-use crate::engine::{self, Part, Plan, Study, Watch};
-use crate::engine::{StudyError, refuse};
+use crate::engine::{self, Part, Plan, Study, StudyError, Watch, refuse};
 
 /// A part of a sweep: every n-th chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
