@@ -30,7 +30,7 @@ pub(crate) fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
     let mut sections = vec![
         Section::new("Fault by fault", blocks),
         Section::new("How often, how soon, how far", how_often),
-        Section::new("Class by class", vec![Block::Table(by_class(campaign))]),
+        Section::of_table("Class by class", by_class(campaign)),
     ];
     sections.extend(told);
     Report::new("Every fault by name", summary(campaign), sections)

@@ -27,10 +27,7 @@ pub(crate) fn report(results: &HandoverResults) -> Report {
                 Block::Text(judgement(results)),
             ],
         ),
-        Section::new(
-            "The first curve of paper-course (300 m, 60 km/h)",
-            vec![Block::Table(table(&papers))],
-        ),
+        Section::of_table("The first curve of paper-course (300 m, 60 km/h)", table(&papers)),
         Section::new(
             "Each bend",
             vec![Block::Table(Table::of_rows("", each.map(bend_row))).on_page()],

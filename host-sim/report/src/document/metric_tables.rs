@@ -27,11 +27,8 @@ pub fn metrics_table(
 
 /// What every metric means, in which unit, and where it comes from.
 pub fn definitions_table() -> Table {
-    let row = |d: &Definition| {
-        let cells = [d.label, d.name, d.unit, d.definition, d.source];
-        cells.map(Cell::text).to_vec()
-    };
-    Table::new(
+    let row = |d: &Definition| [d.label, d.name, d.unit, d.definition, d.source];
+    Table::of_texts(
         "e: lateral error; T_d: driver's torque; T_h: guidance torque; v: speed; r: yaw rate.",
         ["Metric", "Name in JSON", "Unit", "Definition", "Source"],
         DEFINITIONS.iter().map(row),

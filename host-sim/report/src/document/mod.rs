@@ -60,6 +60,11 @@ impl Section {
             blocks,
         }
     }
+
+    /// A heading and one table.
+    pub fn of_table(heading: impl Into<String>, table: Table) -> Self {
+        Self::new(heading, vec![Block::Table(table)])
+    }
 }
 
 /// A piece of a section.
@@ -156,6 +161,16 @@ impl Table {
         table
     }
 
+    /// A table of words.
+    pub fn of_texts<T: Into<String>, const N: usize>(
+        caption: &str,
+        columns: [&str; N],
+        rows: impl IntoIterator<Item = [T; N]>,
+    ) -> Self {
+        let cells = |row: [T; N]| row.map(Cell::text).to_vec();
+        Self::new(caption, columns, rows.into_iter().map(cells))
+    }
+
     /// A table of names and values.
     pub fn of_pairs<N: Into<String>, V: Into<String>>(
         columns: [&str; 2],
@@ -237,6 +252,11 @@ impl Report {
             sections,
             ..Self::default()
         }
+    }
+
+    /// The report with what a reader of the results has to know.
+    pub fn with_notes(self, notes: Vec<String>) -> Self {
+        Self { notes, ..self }
     }
 
     /// The report as one HTML document.

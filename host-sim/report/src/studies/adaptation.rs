@@ -48,10 +48,7 @@ pub fn report(results: &AdaptationResults) -> Report {
         Section::new("Where loops swing", swings),
     ];
     let title = format!("Two adaptations: {}", results.name);
-    Report {
-        notes: notes(results),
-        ..Report::new(title, summary(results), sections)
-    }
+    Report::new(title, summary(results), sections).with_notes(notes(results))
 }
 
 fn summary(results: &AdaptationResults) -> String {

@@ -44,17 +44,14 @@ pub fn report(results: &CompareResults) -> Report {
         Block::Text(front_judgement(results)),
     ];
     let sections = vec![
-        Section::new("The laws", vec![Block::Table(laws(results))]),
+        Section::of_table("The laws", laws(results)),
         Section::new("What each law trades", front),
         Section::new("Laws by drivers", blocks.collect()),
         Section::new(format!("All drivers, over {first}"), of_all),
         Section::new(format!("Against {first}"), verdicts),
     ];
     let title = format!("Laws and drivers: {}", results.name);
-    Report {
-        notes: notes(results),
-        ..Report::new(title, summary(results), sections)
-    }
+    Report::new(title, summary(results), sections).with_notes(notes(results))
 }
 
 fn summary(results: &CompareResults) -> String {
@@ -79,18 +76,15 @@ fn summary(results: &CompareResults) -> String {
 
 /// The laws that a file may name.
 pub fn law_kinds() -> Table {
-    kinds(Kinds::default().laws.iter().map(kind))
+    Table::of_texts("", KINDS, Kinds::default().laws.iter().map(kind))
 }
 
 /// The drivers that a file may name, and their habits.
 pub fn driver_kinds() -> Table {
-    kinds(DRIVERS.iter().chain(&HABITS).map(kind))
+    Table::of_texts("", KINDS, DRIVERS.iter().chain(&HABITS).map(kind))
 }
 
-fn kinds(rows: impl Iterator<Item = [String; 3]>) -> Table {
-    let row = |row: [String; 3]| row.map(Cell::Text).to_vec();
-    Table::new("", ["Kind", "Source", "Parameters"], rows.map(row))
-}
+const KINDS: [&str; 3] = ["Kind", "Source", "Parameters"];
 
 /// Name, source, and each parameter with its default, a star where that was chosen here, its range, and what tuning varies.
 fn kind<P: ?Sized>(kind: &Kind<P>) -> [String; 3] {

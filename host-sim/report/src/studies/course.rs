@@ -6,6 +6,7 @@ use super::curves;
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use crate::plot::{Axis, Figure, Series};
 use haptic_batch::course::{Sample, Survey};
+use haptic_batch::statistics::extent;
 use haptic_log::table::TableWriter;
 use haptic_sim::models::road::Course;
 
@@ -32,13 +33,6 @@ pub fn write_samples(survey: &Survey, directory: &Path) -> Result<(), WriteError
     })
 }
 
-/// The smallest and the largest value.
-fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-        (low.min(v), high.max(v))
-    })
-}
-
 /// Least and largest values along the lane's centre.
 fn table(survey: &Survey) -> Table {
     /// Name, unit, digits, value.
@@ -50,9 +44,7 @@ fn table(survey: &Survey) -> Table {
         ("Lane width", "m", 3, |s| s.width_m),
     ];
     let row = |(name, unit, decimals, of): (&str, &str, usize, fn(&Sample) -> f64)| {
-        let values = survey.samples.iter().map(of);
-
-        let (least, most) = extent(values);
+        let [least, most] = extent(survey.samples.iter().map(of));
         [
             ("Along the lane's centre", Cell::text(name)),
             ("Least", Cell::number(least, decimals)),
@@ -65,8 +57,8 @@ fn table(survey: &Survey) -> Table {
 
 fn plan(survey: &Survey) -> Figure {
     let points: Vec<(f64, f64)> = survey.samples.iter().map(|s| (s.x_m, s.y_m)).collect();
-    let (left, right) = extent(points.iter().map(|p| p.0));
-    let (low, high) = extent(points.iter().map(|p| p.1));
+    let [left, right] = extent(points.iter().map(|p| p.0));
+    let [low, high] = extent(points.iter().map(|p| p.1));
     let height = 1.1 * (high - low).max((right - left) / PANEL_ASPECT).max(1.0);
     let around = |axis: Axis, from: f64, to: f64, size: f64| {
         axis.within(0.5 * (from + to - size), 0.5 * (from + to + size))
@@ -109,17 +101,14 @@ pub fn report(survey: &Survey, course: &Course) -> Report {
         Block::figure("course", along(survey, course), along_road),
     ];
     let sections = vec![Section::new("The centre of the lane", blocks)];
-    Report {
-        notes: survey.notes.clone(),
-        ..Report::new("A course", &survey.course, sections)
-    }
+    Report::new("A course", &survey.course, sections).with_notes(survey.notes.clone())
 }
 
 /// The plan in dots, with one scale for both axes; o marks the start.
 fn picture(survey: &Survey) -> String {
     let [columns, rows] = PICTURE;
-    let (left, right) = extent(survey.samples.iter().map(|s| s.x_m));
-    let (low, high) = extent(survey.samples.iter().map(|s| s.y_m));
+    let [left, right] = extent(survey.samples.iter().map(|s| s.x_m));
+    let [low, high] = extent(survey.samples.iter().map(|s| s.y_m));
     // A dot is as wide as it is high where a character is twice as high as wide.
     let dots = [2 * columns - 1, 4 * rows - 1].map(|n| n as f64);
     let scale = ((right - left) / dots[0]).max((high - low) / dots[1]).max(1e-3);

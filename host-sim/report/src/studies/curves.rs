@@ -1,6 +1,7 @@
 //! The curves of a course, and the stretches without guidance, as shaded stretches of a figure over the road.
 
 use crate::plot::{Band, Shade};
+use haptic_batch::statistics::extent;
 use haptic_sim::models::road::{Centreline, Course};
 use haptic_sim::unguided::Unguided;
 
@@ -27,9 +28,7 @@ pub(super) fn bands(course: &Course) -> Vec<Band> {
         let curvatures = [segment.curvature_start_1pm, segment.curvature_end_1pm]
             .into_iter()
             .chain(inside);
-        let (least, most) = curvatures.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), c| {
-            (least.min(c), most.max(c))
-        });
+        let [least, most] = extent(curvatures);
         let largest = most.max(-least);
         if largest > STRAIGHT_1PM {
             let dark = most - least <= ARC * largest;

@@ -222,7 +222,7 @@ pub fn report(evaluation: &Evaluation) -> Report {
         Section::new("Failure of the guidance (figure 9)", figure9),
         Section::new("Failure of the guidance's input", handover),
         Section::new("Results", in_short),
-        Section::new("What it must show", vec![Block::Table(claims_table(results))]),
+        Section::of_table("What it must show", claims_table(results)),
         Section::new("All metrics", all.collect()),
     ];
     Report {

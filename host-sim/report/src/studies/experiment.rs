@@ -154,10 +154,7 @@ pub fn report(experiment: &Experiment) -> Report {
         Section::new("The identified drivers drive again", again),
     ];
     let title = format!("{} drives, identified", experiment.drives.len());
-    Report {
-        notes: left(experiment).into_iter().collect(),
-        ..Report::new(title, summary, sections)
-    }
+    Report::new(title, summary, sections).with_notes(left(experiment).into_iter().collect())
 }
 
 /// Mean fits and errors, beside the paper's.

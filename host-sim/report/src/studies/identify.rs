@@ -278,9 +278,9 @@ pub fn report(drive: &IdentifiedDrive) -> Report {
             .map(Block::Table);
         Section::new("Pieces", [figure].into_iter().chain(tables).collect())
     });
-    let table = |heading, table| Section::new(heading, vec![Block::Table(table)]);
-    let in_the_log = in_the_log(found).map(|found| table("In the log", found));
-    let again = drives_again(drive).map(|again| table("The identified driver on the course", again));
+    let in_the_log = in_the_log(found).map(|found| Section::of_table("In the log", found));
+    let again =
+        drives_again(drive).map(|again| Section::of_table("The identified driver on the course", again));
     let always = [
         Section::new("Parameters", verdict_blocks(found, drive.results.level)),
         Section::new("Fit", fit),
@@ -296,11 +296,10 @@ pub fn report(drive: &IdentifiedDrive) -> Report {
 
 /// What was found in the log and done about it.
 fn in_the_log(found: &Identification) -> Option<Table> {
-    let rows = found.preflight.as_ref()?.findings().into_iter();
-    Some(Table::new(
+    Some(Table::of_texts(
         "What was found in the log, and what was done about it.",
         ["In the log", "Found", "Done"],
-        rows.map(|row| row.map(Cell::Text).to_vec()),
+        found.preflight.as_ref()?.findings(),
     ))
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use haptic_batch::Away;
+use haptic_batch::statistics::{deviation, mean};
 use haptic_batch::study::{
     Difference, Recorded, Repeated, Session, SessionResult, Source, StudyResults, Subject, of_participants,
 };
@@ -49,10 +50,7 @@ pub fn report(results: &StudyResults) -> Report {
         Section::new("By condition", by_condition),
         Section::new("Differences between conditions", differences),
     ];
-    Report {
-        notes: results.notes.clone(),
-        ..Report::new(&results.study, "", sections)
-    }
+    Report::new(&results.study, "", sections).with_notes(results.notes.clone())
 }
 
 /// Writes the table of sessions and that of the differences between conditions (CSV).
@@ -244,15 +242,12 @@ fn by_condition(results: &StudyResults) -> Table {
         for condition in &results.conditions {
             let each = of_participants(&results.sessions, condition, d);
             let values: Vec<f64> = each.into_iter().flatten().collect();
-            let n = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / n;
-            let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-            let deviation = (n > 1.0).then(|| (square / (n - 1.0)).sqrt());
+            let mean = mean(values.iter().copied());
+            let deviation = mean.and_then(|mean| deviation(&values, mean));
             cells.extend([
-                // Of no value it is no number, which a table shows as a dash.
                 Cell::number(mean, 4),
                 Cell::number(deviation, 4),
-                Cell::number(n, 0),
+                Cell::count(values.len()),
             ]);
         }
         cells

@@ -22,24 +22,15 @@ pub fn assist_report(results: &Results) -> Report {
     ];
     let sections = vec![
         Section::new("What 1 N.m of guidance becomes", felt),
-        Section::new(
-            "The loop through the assist",
-            vec![Block::Table(loops_table(&results.loops))],
-        ),
-        Section::new(
-            "The drivers of tables 5 to 8",
-            vec![Block::Table(drivers_table(&results.drivers))],
-        ),
+        Section::of_table("The loop through the assist", loops_table(&results.loops)),
+        Section::of_table("The drivers of tables 5 to 8", drivers_table(&results.drivers)),
     ];
     let bar = &results.column.0;
     let summary = format!(
         "A wheel of {} kg.m2 on a bar of {} N.m/rad. Overlay: guidance is added behind the assist; offset: in front of it.",
         bar.j_w_kg_m2, bar.k_tb_nm_per_rad
     );
-    Report {
-        notes: vec![LEFT_OUT.into()],
-        ..Report::new("Overlay or offset", summary, sections)
-    }
+    Report::new("Overlay or offset", summary, sections).with_notes(vec![LEFT_OUT.into()])
 }
 
 fn name(inject: Inject) -> &'static str {
@@ -206,11 +197,11 @@ pub fn reading_report(results: &reading::Results) -> Report {
          bar, and has the angle of the column.",
         reading::SEEDS
     );
-    let table = Block::Table(Table::of_rows(caption, results.rows.iter().map(row)));
+    let table = Table::of_rows(caption, results.rows.iter().map(row));
     Report::new(
         "K_hg through a torsion bar",
         summary,
-        vec![Section::new("", vec![table])],
+        vec![Section::of_table("", table)],
     )
 }
 
@@ -241,14 +232,8 @@ pub fn sensors_report(results: &sensors::Results) -> Report {
                 )),
             ],
         ),
-        Section::new(
-            "The ECU behind the bar",
-            vec![Block::Table(ecu_table(&results.ecu))],
-        ),
-        Section::new(
-            "All",
-            vec![Block::Table(Table::of_rows(all, results.rows.iter().map(row)))],
-        ),
+        Section::of_table("The ECU behind the bar", ecu_table(&results.ecu)),
+        Section::of_table("All", Table::of_rows(all, results.rows.iter().map(row))),
     ];
     let summary = format!(
         "Hands that steer with {} N.m at 0.4 Hz and half of it at 1.1 Hz, guidance and probe beside them; then no hand. 60 km/h, \
@@ -257,10 +242,7 @@ pub fn sensors_report(results: &sensors::Results) -> Report {
         results.curve
     );
     let note = "One pattern of hands, a smooth road, no bumps; the angle has no noise but its steps.";
-    Report {
-        notes: vec![note.into()],
-        ..Report::new("The hands' torque through a torsion bar", summary, sections)
-    }
+    Report::new("The hands' torque through a torsion bar", summary, sections).with_notes(vec![note.into()])
 }
 
 fn hand_name(hand: Hand) -> &'static str {
@@ -359,9 +341,9 @@ pub fn hands_report(results: &hands::Results) -> Report {
     let figure = "Seconds in which the swing of the estimate is above a threshold, by threshold: where somebody holds the wheel, and where \
                   nobody does. The angle comes in steps of 0.02 deg every millisecond.";
     let sections = vec![
-        Section::new(
+        Section::of_table(
             "How soon a wheel without hands is known",
-            vec![Block::Table(Table::of_rows(&caption, rows))],
+            Table::of_rows(&caption, rows),
         ),
         Section::new(
             "Hand or motor",
@@ -375,8 +357,5 @@ pub fn hands_report(results: &hands::Results) -> Report {
     );
     let note = "Once in 100 h is extrapolated from the longest fifth of the stretches without a felt hand, not counted. Hands are a spring, a \
                 damper, tremor and a wish of our own choice; no driver closes a loop, and the ECU's own criterion is not this one.";
-    Report {
-        notes: vec![note.into()],
-        ..Report::new("Hands, told from the motor", summary, sections)
-    }
+    Report::new("Hands, told from the motor", summary, sections).with_notes(vec![note.into()])
 }

@@ -26,19 +26,13 @@ pub fn report(vehicle: &IdentifiedVehicle, log: &str) -> Report {
             "Vehicle and column",
             vec![Block::Table(quantities(vehicle)), Block::Table(reasons(found))],
         ),
-        Section::new(
-            "Checks",
-            vec![Block::Table(Table::of_rows("", found.checks.iter().map(check)))],
-        ),
+        Section::of_table("Checks", Table::of_rows("", found.checks.iter().map(check))),
     ];
     if !found.manoeuvres.is_empty() {
         sections.push(Section::new("What would tell the rest", manoeuvres(vehicle)));
     }
-    let assumed = found.assumed.iter().map(|what| vec![Cell::text(what)]);
-    sections.push(Section::new(
-        "Assumed",
-        vec![Block::Table(Table::new("", ["Taken for granted"], assumed))],
-    ));
+    let assumed = Table::of_texts("", ["Taken for granted"], found.assumed.iter().map(|what| [what]));
+    sections.push(Section::of_table("Assumed", assumed));
     Report::new("A vehicle from a recorded drive", summary, sections)
 }
 

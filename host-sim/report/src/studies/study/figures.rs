@@ -1,5 +1,6 @@
 //! The participants under each condition, and what differs between two conditions.
 
+use haptic_batch::statistics;
 use haptic_batch::study::{Difference, StudyResults, of_participants};
 use haptic_metrics::{DEFINITIONS, Definition};
 
@@ -27,10 +28,7 @@ pub(super) fn conditions(results: &StudyResults) -> Figure {
             let own = rows(&|values| *values.get(number)?);
             Series::dots("a participant", 5, own).joined()
         });
-        let mean = rows(&|values| {
-            let known: Vec<f64> = values.iter().flatten().copied().collect();
-            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
-        });
+        let mean = rows(&|values| statistics::mean(values.iter().flatten().copied()));
         let mean = Series::dots("mean", 0, mean).joined();
         Axis::new(metric.label, metric.unit).panel(each.chain([mean]))
     });

@@ -98,7 +98,7 @@ pub fn plan(sweep: &Sweep) -> Report {
     let table = Table::new("", columns, rows);
     let (drives, chunks, design) = (sweep.drives(), sweep.chunks(), design(sweep));
     let summary = format!("{drives} drives in {chunks} chunks{design}");
-    Report::new("", summary, vec![Section::new("", vec![Block::Table(table)])])
+    Report::new("", summary, vec![Section::of_table("", table)])
 }
 
 fn values(point: &DesignPoint) -> impl Iterator<Item = String> {
