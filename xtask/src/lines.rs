@@ -21,7 +21,7 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("examples", 200),
     ("firmware", 3_160),
     ("firmware/lockstep", 200),
-    ("host-sim", 3_550),
+    ("host-sim", 3_520),
     ("host-sim/analysis", 7_420),
     ("host-sim/batch", 8_910),
     ("host-sim/campaign", 4_150),

@@ -8,23 +8,38 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use haptic_batch::StudyError;
+use haptic_report::document::Provenance;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 
 use super::{BadInput, in_file};
 
-/// A file of parts.
+/// A file of parts; without a file nothing is kept.
+#[derive(Default)]
 pub struct Checkpoint {
     path: PathBuf,
-    file: Mutex<File>,
+    file: Option<Mutex<File>>,
+}
+
+/// The parts that an earlier run left in a file, and what keeps each new one. The study says what the parts belong to; this program does
+/// too, since another one drives others.
+///
+/// # Errors
+/// Another study's file, or one that cannot be read or written.
+pub fn resume<T: DeserializeOwned>(
+    path: Option<&Path>,
+    mut study: Value,
+) -> Result<(Vec<T>, Checkpoint), BadInput> {
+    study["provenance"] = json!(Provenance::new(None));
+    let opened = path.map(|path| Checkpoint::open(path, &study.to_string()));
+    Ok(opened.transpose()?.unwrap_or_default())
 }
 
 impl Checkpoint {
     /// Opens the file, or makes it; gives the parts that it holds. `heading` says what they belong to.
-    ///
-    /// # Errors
-    /// Another study's file, or one that cannot be read or written.
-    pub fn open<T: DeserializeOwned>(path: &Path, heading: &str) -> Result<(Self, Vec<T>), BadInput> {
+    fn open<T: DeserializeOwned>(path: &Path, heading: &str) -> Result<(Vec<T>, Self), BadInput> {
         let fail = |e: &dyn std::fmt::Display| in_file(path)(e);
         let text = match std::fs::read_to_string(path) {
             Ok(text) => text,
@@ -60,20 +75,23 @@ impl Checkpoint {
         }
         let checkpoint = Self {
             path: path.to_path_buf(),
-            file: Mutex::new(file),
+            file: Some(Mutex::new(file)),
         };
-        Ok((checkpoint, parts))
+        Ok((parts, checkpoint))
     }
 
-    /// Adds a part.
+    /// Adds a part, if there is a file.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn add(&self, part: &impl Serialize) -> Result<(), String> {
+    pub fn add(&self, part: &impl Serialize) -> Result<(), StudyError> {
+        let Some(file) = &self.file else {
+            return Ok(());
+        };
         let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", self.path.display());
         let mut line = serde_json::to_string(part).map_err(|e| fail(&e))?;
         line.push('\n');
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.write_all(line.as_bytes()).map_err(|e| fail(&e))
+        let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(file.write_all(line.as_bytes()).map_err(|e| fail(&e))?)
     }
 }

@@ -10,8 +10,8 @@ use haptic_log::recording::{Line, Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
-use super::recording::{ReadingArguments, print_reading};
-use super::{BadInput, Outcome, in_file, output, print, print_json, progress, width};
+use super::recording::ReadingArguments;
+use super::{BadInput, Outcome, in_file, output, print, print_json, print_notes, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -35,18 +35,9 @@ pub(super) struct Arguments {
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Listed<'a> {
-    channels: Vec<Channel>,
+    channels: Vec<Line>,
     /// What was left out, merged, cut, mended, guessed or converted.
     notes: &'a Notes,
-}
-
-#[derive(Serialize)]
-struct Channel {
-    name: String,
-    unit: String,
-    source: String,
-    sample_rate_hz: f64,
-    samples: usize,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -79,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         return Ok(Outcome::Good);
     };
     let count = recording.table().len();
-    print_reading(&recording.notes);
+    print_notes(recording.notes.iter());
     formats::write(output, recording)?;
     eprintln!("{}: {count} channels", output.display());
     Ok(Outcome::Good)
@@ -106,7 +97,7 @@ fn of_bus(
             return Err("--rate is for channels, not for frames".into());
         }
         let (count, notes) = formats::write_frames(output, log)?;
-        print_reading(&notes);
+        print_notes(notes.iter());
         eprintln!("{}: {count} frames", output.display());
         return Ok(None);
     }
@@ -127,28 +118,20 @@ fn of_bus(
         list(table, &signals.notes, arguments.json)?;
         return Ok(None);
     };
-    print_reading(&signals.notes);
+    print_notes(signals.notes.iter());
     signals.write_table(output)?;
     eprintln!("{}: {} channels", output.display(), table.len());
     Ok(None)
 }
 
 /// Prints the channels, and below them what was left out.
-fn list(table: Vec<Line>, notes: &Notes, json: bool) -> Result<(), BadInput> {
+fn list(channels: Vec<Line>, notes: &Notes, json: bool) -> Result<(), BadInput> {
     if json {
-        let channels = table.into_iter().map(|line| Channel {
-            name: line.name,
-            unit: line.unit,
-            source: line.source,
-            sample_rate_hz: line.sample_rate_hz,
-            samples: line.samples,
-        });
-        let channels = channels.collect();
         return print_json(&Listed { channels, notes });
     }
     let said: String = notes.iter().map(|note| format!("\n{note}")).collect();
     let space = if said.is_empty() { "" } else { "\n" };
-    let table = listed(table).to_text(width());
+    let table = listed(channels).to_text(width());
     print(&format!("{}{space}{said}", table.trim_end()))
 }
 

@@ -3,16 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::design_guidance::{DesignGuidance, Evaluated};
-use haptic_report::document::{Provenance, write_bytes};
+use haptic_batch::design_guidance::DesignGuidance;
+use haptic_report::document::write_bytes;
 use haptic_report::studies::design_guidance::{parameters, report};
 use serde_json::json;
 
-use super::checkpoint::Checkpoint;
-use super::output;
+use super::checkpoint::resume;
 use super::progress::Threads;
 use super::results::{LevelArgument, ResultArguments};
-use super::{BadInput, Outcome, in_file, progress};
+use super::{BadInput, Outcome, in_file, output};
 
 const OUT: &str = "Directory: every set that was driven, report, results and chosen.toml, which `run` and `ecu parameters` take. A search that was interrupted goes on where it was";
 /// The sets that were driven, a line each.
@@ -45,18 +44,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let out = arguments.results.directory();
     output::check(out, "design-guidance", &[SETS])?;
     std::fs::create_dir_all(out).map_err(in_file(out))?;
-    let heading = json!({
-        "study": "design-guidance",
-        "design": format!("{:016x}", design.identity()),
-        "provenance": Provenance::new(None),
-    });
-    let (checkpoint, known) =
-        Checkpoint::open::<Evaluated>(&out.join(SETS), &serde_json::to_string(&heading)?)?;
+    let study = json!({ "study": "design-guidance", "design": format!("{:016x}", design.identity()) });
+    let (known, checkpoint) = resume(Some(&out.join(SETS)), study)?;
     output::keeps(out, "set")?;
     let output = arguments.results.begin_beside("design-guidance", &[SETS])?;
-    let keep = |set: &Evaluated| Ok(checkpoint.add(set)?);
-    let results = progress::watched("sets", |watch| {
-        arguments.threads.run(|| design.run(&known, keep, watch))
+    let threads = &arguments.threads;
+    let results = threads.watched("sets", |watch| {
+        design.run(&known, |set| checkpoint.add(set), watch)
     })??;
     if let Some(place) = output.place() {
         write_bytes(&place.join("chosen.toml"), parameters(&results, chosen))?;

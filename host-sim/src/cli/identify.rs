@@ -72,7 +72,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let course = arguments.course.open()?;
     let output = arguments.results.begin("identify")?;
-    let (log, converted) = arguments.recording.open(options.manual, &options.stretches)?;
+    let recording = &arguments.recording;
+    let (log, converted) = recording.open(&recording.log, options.manual, &options.stretches)?;
     if log.approximate_points {
         eprintln!(
             "note: e_y and e_theta are made of offset and curvature of the lane, which is too rough for the driver's gains: k_hg alone \
@@ -84,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             }
         );
     }
-    let name = arguments.recording.log.display().to_string();
+    let name = recording.log.display().to_string();
     let mut drive = if arguments.pieces {
         if method == Method::Paper {
             return Err("--pieces: the published method has none".into());
@@ -98,10 +99,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         let mut logs = vec![log];
         for path in &arguments.also {
-            let other = arguments
-                .recording
-                .open_other(path, options.manual, &options.stretches)?;
-            logs.push(other.0);
+            let (other, _) = recording.open(path, options.manual, &options.stretches)?;
+            logs.push(other);
         }
         let name = format!("{name} and {} more", arguments.also.len());
         identify_several(&name, &logs, &options)?

@@ -255,7 +255,7 @@ fn in_file<E: Display>(path: &Path) -> impl Fn(E) -> BadInput {
 }
 
 /// What a reader of the results has to know, on stderr: stdout is the results' own.
-fn print_notes(notes: &[String]) {
+fn print_notes<N: Display>(notes: impl IntoIterator<Item = N>) {
     for note in notes {
         eprintln!("note: {note}");
     }

@@ -129,16 +129,11 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// For the files of a command, as it is typed.
+    /// For the files of a command, as it is typed, beside those that it keeps by other means.
     ///
     /// # Errors
     /// Nothing can be written there, or it holds what the command did not write.
-    pub(super) fn begin(directory: &Path, command: &str) -> Result<Self, BadInput> {
-        Self::beside(directory, command, &[])
-    }
-
-    /// Begins the output of a command that keeps files by other means too.
-    pub(super) fn beside(directory: &Path, command: &str, keeps: &[&str]) -> Result<Self, BadInput> {
+    pub(super) fn begin(directory: &Path, command: &str, keeps: &[&str]) -> Result<Self, BadInput> {
         catch_interrupts()?;
         let mut unfinished = lock_unfinished();
         let files = FileSet::begin(directory, owner(command, keeps))?;

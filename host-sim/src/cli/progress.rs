@@ -22,8 +22,17 @@ pub struct Threads {
 
 impl Threads {
     /// Does some work on them.
-    pub fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, BadInput> {
+    pub(super) fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, BadInput> {
         Ok(on_threads(self.threads, work)?)
+    }
+
+    /// Does some work on them, under a bar.
+    pub fn watched<T: Send>(
+        &self,
+        unit: &str,
+        work: impl FnOnce(&Watch<'_>) -> T + Send,
+    ) -> Result<T, BadInput> {
+        watched(unit, |watch| self.run(|| work(watch)))
     }
 }
 

@@ -9,11 +9,10 @@ use haptic_analysis::identify::{
 use haptic_batch::files::load_scenario;
 use haptic_batch::identify::single_track;
 use haptic_log::formats::{self, BusLog, Contents, Format, Reading};
-use haptic_log::notes::Notes;
 use haptic_log::recording::{Recording, RecordingError, Term};
 use haptic_sim::input::in_range;
 
-use super::{BadInput, in_file, progress};
+use super::{BadInput, in_file, print_notes, progress};
 
 /// New names, each with the channel that gets it.
 type Names = Vec<(String, Term)>;
@@ -250,7 +249,7 @@ impl ReadingArguments {
             Contents::Channels(recording) => recording,
             Contents::Frames(log) => self.channels(path, &log)?,
         };
-        print_reading(&recording.notes);
+        print_notes(recording.notes.iter());
         Ok(formats::to_csv(recording)?)
     }
 
@@ -264,17 +263,8 @@ impl ReadingArguments {
 }
 
 impl RecordingArguments {
-    /// The log, of which these stretches will be used, and what a reader of the results has to know of it.
+    /// The log in this or another file, of which these stretches will be used, and what a reader of the results has to know of it.
     pub(super) fn open(
-        &self,
-        manual: bool,
-        stretches: &[(f64, f64)],
-    ) -> Result<(DriveLog, Vec<String>), BadInput> {
-        self.open_other(&self.log, manual, stretches)
-    }
-
-    /// Another file, understood in the way of the first.
-    pub(super) fn open_other(
         &self,
         path: &Path,
         manual: bool,
@@ -282,12 +272,5 @@ impl RecordingArguments {
     ) -> Result<(DriveLog, Vec<String>), BadInput> {
         self.reading
             .open(path, manual, stretches, self.vehicle.as_deref())
-    }
-}
-
-/// What the file that is written does not hold as the other did, on stderr.
-pub(super) fn print_reading(notes: &Notes) {
-    for note in notes.iter() {
-        eprintln!("note: {note}");
     }
 }

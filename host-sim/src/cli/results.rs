@@ -61,7 +61,7 @@ impl ResultArguments {
     /// A directory that cannot be written, or that holds files of somebody else.
     pub fn begin_beside(&self, command: &str, keeps: &[&str]) -> Result<Results<'_>, BadInput> {
         let place = self.out.as_deref();
-        let output = place.map(|place| Output::beside(place, command, keeps));
+        let output = place.map(|place| Output::begin(place, command, keeps));
         Ok(Results {
             output: output.transpose()?,
             ..self.without_files()

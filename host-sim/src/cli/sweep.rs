@@ -135,7 +135,7 @@ fn replay(arguments: &Arguments, sweep: &Sweep, drive: u64) -> Result<Outcome, B
 }
 
 fn write_drive(scenario: &haptic_sim::Scenario, directory: &Path) -> Result<(), BadInput> {
-    let output = Output::begin(directory, "sweep --replay")?;
+    let output = Output::begin(directory, "sweep --replay", &[])?;
     let single = haptic_batch::run::run(scenario.clone(), false)?;
     let report = run_files::report(&single);
     output.finish(|place| {

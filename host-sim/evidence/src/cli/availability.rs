@@ -7,13 +7,13 @@ use clap::Args;
 use haptic_batch::engine;
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, campaign};
-use haptic_evidence::availability::{AvailabilityPlan, DriveSegment, ROADS, resumed};
+use haptic_evidence::availability::{AvailabilityPlan, ROADS, resumed};
 use haptic_sim::worlds::WORLDS;
+use serde_json::json;
 
-use host_sim::cli::checkpoint::Checkpoint;
-use host_sim::cli::output;
+use host_sim::cli::checkpoint::resume;
 use host_sim::cli::results::{LevelArgument, ResultArguments};
-use host_sim::cli::{BadInput, Outcome, chosen, print, progress, width};
+use host_sim::cli::{BadInput, Outcome, chosen, output, print, progress, width};
 
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
@@ -59,20 +59,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let out = arguments.results.out.as_deref();
     let kept = kept_in(out, arguments.checkpoint.as_deref());
     let output = arguments.results.begin_beside("availability", &kept)?;
-    let (checkpoint, on_record) = match &arguments.checkpoint {
-        None => (None, Vec::new()),
-        Some(path) => {
-            let (checkpoint, segments) = Checkpoint::open::<DriveSegment>(path, &heading(plan.seed)?)?;
-            output::keeps(path, "drive")?;
-            (Some(checkpoint), segments)
-        }
-    };
-    let keep = |segment: &DriveSegment| match &checkpoint {
-        Some(checkpoint) => Ok(checkpoint.add(segment)?),
-        None => Ok(()),
-    };
+    let file = arguments.checkpoint.as_deref();
+    let study = json!({ "study": "availability", "seed": plan.seed });
+    let (on_record, checkpoint) = resume(file, study)?;
+    if let Some(path) = file {
+        output::keeps(path, "drive")?;
+    }
     let results = progress::watched("drives of five minutes", |watch| {
-        engine::run(&plan, &resumed(&on_record, keep), watch)
+        engine::run(&plan, &resumed(&on_record, |drive| checkpoint.add(drive)), watch)
     })?;
     let results = Balance {
         detection: detection(&plan, arguments.fault_seeds),
@@ -107,16 +101,6 @@ fn plan(arguments: &Arguments) -> Result<AvailabilityPlan, BadInput> {
         only: arguments.drives.clone(),
         level: arguments.level.level,
     })
-}
-
-/// What the drives of a file belong to: another program drives others.
-fn heading(seed: u64) -> Result<String, BadInput> {
-    let provenance = haptic_report::document::Provenance::new(None);
-    Ok(serde_json::to_string(&serde_json::json!({
-        "study": "availability",
-        "seed": seed,
-        "provenance": provenance,
-    }))?)
 }
 
 /// Every fault in the world that is to be as good as real.

@@ -2,10 +2,9 @@
 
 use crate::reports::faults::{report, report_of_run};
 use clap::Args;
-use haptic_campaign::campaign;
 use haptic_campaign::drivers::Drivers;
 use haptic_campaign::table::{self, FaultCase, Place};
-use haptic_campaign::{World, document, target};
+use haptic_campaign::{World, campaign, document, target};
 use haptic_core::controller::params::LAWS;
 use haptic_log::near::did_you_mean;
 use haptic_report::document::write_bytes;

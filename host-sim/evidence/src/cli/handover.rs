@@ -6,7 +6,7 @@ use haptic_evidence::handover::{EVERY_S, HandoverRow, study};
 
 use host_sim::cli::progress::Threads;
 use host_sim::cli::results::ResultArguments;
-use host_sim::cli::{BadInput, Outcome, progress};
+use host_sim::cli::{BadInput, Outcome};
 
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
@@ -30,9 +30,8 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments.results.begin("handover")?;
-    let results = progress::watched("drives", |watch| {
-        arguments.threads.run(|| study(arguments.every, watch))
-    })??;
+    let threads = &arguments.threads;
+    let results = threads.watched("drives", |watch| study(arguments.every, watch))??;
     let holds = !results.rows.iter().any(HandoverRow::is_broken);
     output.show(&report(&results), &results, holds)
 }

@@ -5,20 +5,20 @@ use std::path::PathBuf;
 use crate::reports::validation::Validation;
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
-use haptic_batch::engine::{self, Watch};
+use haptic_batch::engine::{self, Store, Watch};
 use haptic_batch::experiment::ExperimentPlan;
 use haptic_evidence::estimates::{
     POPULATION, RandomDrive, RandomPlan, changes, corruptions, methods, recordings, repeat, resumed_random,
 };
 use haptic_evidence::vehicle::coverage;
 use haptic_log::near::did_you_mean;
+use serde_json::json;
 
-use host_sim::cli::checkpoint::Checkpoint;
-use host_sim::cli::output;
+use host_sim::cli::checkpoint::resume;
 use host_sim::cli::participants::Drives;
 use host_sim::cli::progress::Threads;
 use host_sim::cli::results::ResultArguments;
-use host_sim::cli::{BadInput, Outcome, progress};
+use host_sim::cli::{BadInput, Outcome, output};
 
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("question").required(true), mut_arg("probe", |probe| probe.default_value("0.2")))]
@@ -92,9 +92,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .collect();
     let kept: Vec<&str> = logs.iter().map(String::as_str).collect();
     let output = arguments.results.begin_beside("validate", &kept)?;
-    let record = OnRecord::open(arguments, &plan)?;
-    let answer = || progress::watched("drives", |watch| arguments.answer(&plan, &record, watch));
-    let result = arguments.threads.run(answer)??;
+    let file = arguments.checkpoint.as_deref();
+    let (on_record, checkpoint) = resume(file, json!({ "study": "random drives", "plan": plan }))?;
+    if let Some(path) = file {
+        output::keeps(path, "drive")?;
+    }
+    let store = resumed_random(&on_record, |drive| checkpoint.add(drive));
+    let threads = &arguments.threads;
+    let result = threads.watched("drives", |watch| arguments.answer(&plan, &store, watch))??;
     let broken = result.broken();
     for line in &broken {
         eprintln!("NOT KEPT: {line}");
@@ -111,37 +116,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     output.show(&result.report(), &result, broken.is_empty())
 }
 
-/// Random drives that an earlier run did, and where new ones go.
-struct OnRecord {
-    checkpoint: Option<Checkpoint>,
-    drives: Vec<RandomDrive>,
-}
-
-impl OnRecord {
-    fn open(arguments: &Arguments, plan: &ExperimentPlan) -> Result<Self, BadInput> {
-        let Some(path) = &arguments.checkpoint else {
-            return Ok(Self {
-                checkpoint: None,
-                drives: Vec::new(),
-            });
-        };
-        // Another program drives others.
-        let provenance = haptic_report::document::Provenance::new(None);
-        let heading = serde_json::json!({ "study": "random drives", "plan": plan, "provenance": provenance });
-        let (checkpoint, drives) = Checkpoint::open(path, &serde_json::to_string(&heading)?)?;
-        output::keeps(path, "drive")?;
-        Ok(Self {
-            checkpoint: Some(checkpoint),
-            drives,
-        })
-    }
-}
-
 impl Arguments {
     fn answer(
         &self,
         plan: &ExperimentPlan,
-        record: &OnRecord,
+        on_record: &impl Store<u32, RandomDrive>,
         watch: &Watch<'_>,
     ) -> Result<Validation, StudyError> {
         Ok(if let Some(drives) = self.coverage {
@@ -163,15 +142,7 @@ impl Arguments {
                 plan: plan.clone(),
                 numbers,
             };
-            let keep = |drive: &RandomDrive| match &record.checkpoint {
-                Some(checkpoint) => Ok(checkpoint.add(drive)?),
-                None => Ok(()),
-            };
-            Validation::Random(Box::new(engine::run(
-                &plan,
-                &resumed_random(&record.drives, keep),
-                watch,
-            )?))
+            Validation::Random(Box::new(engine::run(&plan, on_record, watch)?))
         } else {
             Validation::Methods(methods(plan, self.methods.unwrap_or(1), watch)?)
         })

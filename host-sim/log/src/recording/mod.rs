@@ -9,6 +9,8 @@ pub mod grid;
 mod stamps;
 mod term;
 
+use serde::Serialize;
+
 use crate::notes::Notes;
 use crate::trace::{CHANNELS, Trace};
 use crate::units;
@@ -80,7 +82,7 @@ pub(crate) fn refuse(e: impl std::fmt::Display) -> RecordingError {
 }
 
 /// A line of the table of channels.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
     /// Name of the channel.
     pub name: String,

@@ -1,31 +1,24 @@
 //! `host-sim ecu cost [SCENARIO.toml]`: what authentication and a workshop's questions cost the ECU.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use haptic_sim::input::InputError;
-use haptic_sim::scenario::Scenario;
 
 use super::super::{BadInput, Outcome, print, print_json};
-use super::failed;
+use super::{ScenarioArgument, failed};
 use crate::processor::{self, ProcessorError};
 use crate::tester;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// Scenario file (TOML, see docs/files.md); default: medium reliance on paper-course
-    #[arg(value_name = "SCENARIO.toml")]
-    scenario: Option<PathBuf>,
+    #[command(flatten)]
+    scenario: ScenarioArgument,
     /// Print the results as one JSON object
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let scenario = match &arguments.scenario {
-        Some(path) => haptic_batch::files::load_scenario(path)?,
-        None => Scenario::default(),
-    };
+    let scenario = arguments.scenario.load()?;
     let drive = match processor::record(&scenario) {
         Ok(drive) => drive,
         Err(ProcessorError::Scenario(message)) => return Err(InputError::new("cost", message).into()),

@@ -7,7 +7,7 @@ use haptic_pil::PilError;
 use haptic_pil::diagnosis::{
     BENCH_KEY, Entry, Format, KEY_BYTES, Key, Reading, Tester, Trouble, codes, entries, named,
 };
-use haptic_report::document::{Cell, Table};
+use haptic_report::document::Table;
 use haptic_sim::input::{InputError, did_you_mean};
 use serde_json::{Map, Value, json};
 
@@ -179,21 +179,8 @@ fn key(write: &Write) -> Result<Key, InputError> {
     };
     let wrong = |what: String| InputError::new(path.display().to_string(), what);
     let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
-    let digits: Vec<u8> = text
-        .chars()
-        .filter_map(|digit| digit.to_digit(16).map(|digit| digit as u8))
-        .collect();
-    let strange = text
-        .chars()
-        .any(|sign| !sign.is_ascii_hexdigit() && !sign.is_whitespace());
-    let bytes: Vec<u8> = digits
-        .chunks(2)
-        .map(|pair| pair.iter().fold(0, |byte, digit| byte << 4 | digit))
-        .collect();
-    let key = Key::try_from(bytes)
-        .ok()
-        .filter(|_| !strange && digits.len() == 2 * KEY_BYTES);
-    key.ok_or_else(|| wrong(format!("a key is {} hexadecimal digits", 2 * KEY_BYTES)))
+    let digits: String = text.split_whitespace().collect();
+    keys::from_digits(&digits).ok_or_else(|| wrong(format!("a key is {} hexadecimal digits", 2 * KEY_BYTES)))
 }
 
 /// A code as workshops write it: C1111.
@@ -233,7 +220,7 @@ fn list(troubles: &[Trouble], json: bool) -> Result<(), BadInput> {
             found.map_or("-".into(), |(_, reading)| text(Some(reading)))
         };
         let is = |bit: u8| if trouble.status & bit != 0 { "yes" } else { "no" };
-        let cells = [
+        [
             code(trouble.code),
             name(trouble),
             is(0x01).into(),
@@ -244,8 +231,7 @@ fn list(troubles: &[Trouble], json: bool) -> Result<(), BadInput> {
             of("guidance_torque"),
             of("driver_torque"),
             of("speed"),
-        ];
-        cells.map(Cell::Text).to_vec()
+        ]
     };
     let head = [
         "code",
@@ -259,7 +245,7 @@ fn list(troubles: &[Trouble], json: bool) -> Result<(), BadInput> {
         "T_d N.m",
         "speed m/s",
     ];
-    print(&Table::new("", head, troubles.iter().map(row)).to_text(width()))
+    print(&Table::of_texts("", head, troubles.iter().map(row)).to_text(width()))
 }
 
 fn show(readings: &[(Entry, Option<Reading>)], json: bool) -> Result<(), BadInput> {
@@ -269,15 +255,15 @@ fn show(readings: &[(Entry, Option<Reading>)], json: bool) -> Result<(), BadInpu
         return print_json(&lines.collect::<Map<_, _>>());
     }
     let row = |(entry, reading): &(Entry, Option<Reading>)| {
-        let cells = [
+        [
             entry.name.to_owned(),
             text(reading.as_ref()),
             entry.unit.to_owned(),
             entry.meaning.trim().to_owned(),
-        ];
-        cells.map(Cell::Text).to_vec()
+        ]
     };
-    print(&Table::new("", ["name", "value", "unit", "meaning"], readings.iter().map(row)).to_text(width()))
+    let head = ["name", "value", "unit", "meaning"];
+    print(&Table::of_texts("", head, readings.iter().map(row)).to_text(width()))
 }
 
 /// A reading; what the ECU does not know is a dash.
@@ -329,27 +315,22 @@ fn description(json: bool) -> Result<(), BadInput> {
         return print_json(&json!({ "data": data.collect::<Vec<_>>(), "codes": codes.collect::<Vec<_>>() }));
     }
     let row = |entry: Entry| {
-        let cells = [
+        [
             format!("{:04X}", entry.id),
             entry.name.to_owned(),
             format_of(&entry),
             entry.unit.to_owned(),
             if entry.is_written { "yes" } else { "no" }.into(),
             entry.meaning.trim().to_owned(),
-        ];
-        cells.map(Cell::Text).to_vec()
+        ]
     };
-    let data = Table::new(
+    let data = Table::of_texts(
         "",
         ["id", "name", "format", "unit", "written", "meaning"],
         entries().map(row),
     );
-    let line = |(number, fault)| {
-        [code(number), format!("{number:06X}"), format!("{fault:?}")]
-            .map(Cell::Text)
-            .to_vec()
-    };
-    let codes = Table::new("", ["code", "DTC", "fault"], codes().map(line));
+    let line = |(number, fault)| [code(number), format!("{number:06X}"), format!("{fault:?}")];
+    let codes = Table::of_texts("", ["code", "DTC", "fault"], codes().map(line));
     print(&format!(
         "{}\n\n{}",
         data.to_text(width()),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use haptic_pil::diagnosis::Key;
+use haptic_pil::diagnosis::{KEY_BYTES, Key};
 use haptic_secoc::Keys;
 use haptic_secoc::fresh::Algorithm;
 use haptic_sim::input::InputError;
@@ -20,12 +20,8 @@ pub(super) fn load(path: &Path) -> Result<(Keys, Key), InputError> {
         _ => Err(wrong(format!("{name} is missing, or no text in quotation marks"))),
     };
     let key = |name: &str| -> Result<Key, InputError> {
-        let digits = field(name)?;
-        let is_key = digits.len() == 32 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
-        let number = u128::from_str_radix(digits, 16).ok().filter(|_| is_key);
-        let number =
-            number.ok_or_else(|| wrong(format!("{name}: a key has 16 bytes, 32 hexadecimal digits")))?;
-        Ok(number.to_be_bytes())
+        let refused = || wrong(format!("{name}: a key has 16 bytes, 32 hexadecimal digits"));
+        from_digits(field(name)?).ok_or_else(refused)
     };
     let keys = Keys {
         algorithm: match field("mac")?.as_str() {
@@ -37,6 +33,13 @@ pub(super) fn load(path: &Path) -> Result<(Keys, Key), InputError> {
         host: key("host")?,
     };
     Ok((keys, key("access")?))
+}
+
+/// A key of its hexadecimal digits.
+pub(super) fn from_digits(digits: &str) -> Option<Key> {
+    let is_key = digits.len() == 2 * KEY_BYTES && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    let number = u128::from_str_radix(digits, 16).ok().filter(|_| is_key);
+    number.map(u128::to_be_bytes)
 }
 
 #[cfg(test)]

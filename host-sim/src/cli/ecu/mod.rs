@@ -9,9 +9,14 @@ mod parameters;
 mod pil;
 mod run;
 
+use std::path::PathBuf;
+
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Subcommand};
+use haptic_batch::files::load_scenario;
 use haptic_pil::PilError;
+use haptic_sim::input::InputError;
+use haptic_sim::scenario::Scenario;
 
 use super::{BadInput, Outcome};
 
@@ -24,6 +29,21 @@ struct Bus {
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Debug, Args)]
+struct ScenarioArgument {
+    /// Scenario file (TOML, see docs/files.md); default: medium reliance on paper-course
+    #[arg(value_name = "SCENARIO.toml")]
+    scenario: Option<PathBuf>,
+}
+
+impl ScenarioArgument {
+    fn load(&self) -> Result<Scenario, InputError> {
+        self.scenario
+            .as_deref()
+            .map_or_else(|| Ok(Scenario::default()), load_scenario)
+    }
 }
 
 #[derive(Debug, Subcommand)]

@@ -7,7 +7,7 @@ use haptic_core::bus::messages::{Identity, ParameterStatus};
 use haptic_core::controller::params::{PARAMETERS, Parameter, Params};
 use haptic_pil::PilError;
 use haptic_pil::parameters::Product;
-use haptic_report::document::{Cell, Table};
+use haptic_report::document::Table;
 use serde_json::json;
 
 use super::super::{BadInput, Outcome, print, print_json, width};
@@ -115,16 +115,15 @@ fn shortest(value: f64) -> f64 {
 
 fn listing(params: &Params) -> String {
     let row = |(parameter, value): (&Parameter, f64)| {
-        let cells = [
+        [
             parameter.name.to_owned(),
             shortest(value).to_string(),
             parameter.unit.to_owned(),
             format!("{} to {}", parameter.min, parameter.max),
             parameter.meaning.trim().to_owned(),
-        ];
-        cells.map(Cell::Text).to_vec()
+        ]
     };
-    let table = Table::new(
+    let table = Table::of_texts(
         "",
         ["parameter", "value", "unit", "range", "meaning"],
         PARAMETERS.iter().zip(params.to_values()).map(row),

@@ -1,7 +1,7 @@
 //! `host-sim ecu pil [SCENARIO.toml]`.
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::processor::{self, ProcessorError};
@@ -9,16 +9,14 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use haptic_pil::{Channel, Machine, Target};
 use haptic_sim::input::InputError;
-use haptic_sim::scenario::Scenario;
 
 use super::super::{BadInput, Outcome, print, print_json, progress};
-use super::failed;
+use super::{ScenarioArgument, failed};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// Scenario file (TOML, see docs/files.md); default: medium reliance on paper-course
-    #[arg(value_name = "SCENARIO.toml")]
-    scenario: Option<PathBuf>,
+    #[command(flatten)]
+    scenario: ScenarioArgument,
     /// How frames reach the target: fifo (a pipe) or slcan (ASCII on the UART, much slower)
     #[arg(long, default_value = "fifo")]
     channel: Channel,
@@ -42,10 +40,7 @@ pub(in crate::cli) struct Arguments {
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let scenario = match &arguments.scenario {
-        Some(path) => haptic_batch::files::load_scenario(path)?,
-        None => Scenario::default(),
-    };
+    let scenario = arguments.scenario.load()?;
     let steps = scenario.duration_s() * 1e3;
     let bar = progress::bar(steps as u64, "steps");
     let target = match &arguments.can {
@@ -71,10 +66,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let report = match result {
         Ok(report) => report,
         Err(ProcessorError::Scenario(message)) => {
-            let name = arguments
-                .scenario
-                .as_deref()
-                .map_or("pil".into(), Path::to_string_lossy);
+            let path = arguments.scenario.scenario.as_deref();
+            let name = path.map_or("pil".into(), Path::to_string_lossy);
             return Err(InputError::new(name, message).into());
         }
         Err(ProcessorError::Interrupted) => return Ok(Outcome::Interrupted),
