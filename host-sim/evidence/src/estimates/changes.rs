@@ -9,18 +9,15 @@ use haptic_analysis::identify::{
     Change, DriveLog, Identification, Options, Pieces, identify_in_pieces, identify_with_noise_model,
 };
 use haptic_log::near::did_you_mean;
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use super::changing::{Changed, driver_at};
+use super::corruption::random_of;
 use super::corruptions::{Held, tolerance};
 use super::kinds::{ASSUMED_NOT_TO, Drawn, KINDS};
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, each};
-use haptic_batch::experiment::ExperimentPlan;
-use haptic_batch::experiment::guided;
-use haptic_batch::experiment::{COMPARED, compared};
+use haptic_batch::experiment::{COMPARED, ExperimentPlan, compared, guided};
 
 /// What was made of one kind of change.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -90,8 +87,7 @@ pub fn changes(
         let place = (drive as usize + number as usize) % kinds.len();
         let (name, kind) = kinds[place];
         let plan = plan.repetition(drive);
-        let seed = plan.seed.wrapping_mul(100).wrapping_add(u64::from(number));
-        let drawn = kind.drawn(&published, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let drawn = kind.drawn(&published, &mut random_of(&plan, number));
         let log = drawn.log(&plan, number)?;
         let options = Options::default();
         let whole = identify_with_noise_model(&log, &options);

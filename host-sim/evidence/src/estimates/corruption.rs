@@ -111,7 +111,8 @@ pub(super) fn changing(
     })
 }
 
-fn random_of(plan: &ExperimentPlan, number: u32) -> Xoshiro256PlusPlus {
+/// What is drawn by chance of a participant's drive; the same for the same plan.
+pub(super) fn random_of(plan: &ExperimentPlan, number: u32) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)))
 }
 

@@ -12,14 +12,11 @@ use serde::Serialize;
 
 use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
-use super::recordings::SoughtWheel;
 use super::repetitions::bound_of;
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, each};
-use haptic_batch::experiment::ExperimentPlan;
-use haptic_batch::experiment::{COMPARED, Compared, compared};
-use haptic_batch::experiment::{driven_by, guided};
-use haptic_batch::statistics::rms;
+use haptic_batch::experiment::{COMPARED, Compared, ExperimentPlan, compared, driven_by, guided};
+use haptic_batch::statistics::{mean, rms};
 use haptic_sim::participants::PublishedDriver;
 
 /// How many 95 % intervals of identified values hold the truth.
@@ -84,6 +81,42 @@ pub struct CorruptionLine {
     pub rms: [f64; COMPARED],
     /// Drives in which K_hg was identified and within 0.05.
     pub k_hg_read: usize,
+}
+
+/// What was made of the inertia of a wheel that was sought.
+#[derive(Debug, Clone, Serialize)]
+pub struct SoughtWheel {
+    /// How the drives were recorded.
+    pub recorded: &'static str,
+    /// Drives whose inertia was identified, and how many of their 95 % intervals hold it.
+    pub intervals: Held,
+    /// Root mean square of their errors, kg.m2.
+    pub rms: Option<f64>,
+    /// Mean of their standard errors, kg.m2.
+    pub standard_error: Option<f64>,
+}
+
+impl SoughtWheel {
+    pub(super) fn new(
+        recorded: &'static str,
+        truth: f64,
+        fits: &[([Compared; COMPARED], Identification)],
+    ) -> Self {
+        let sought = fits.iter().flat_map(|(_, fit)| &fit.beyond);
+        let found: Vec<Compared> = sought
+            .filter(|(name, wheel)| *name == "wheel_inertia" && wheel.identified)
+            .map(|&(name, wheel)| (name, wheel, truth))
+            .collect();
+        let errors = found
+            .iter()
+            .filter_map(|(_, wheel, _)| Some(wheel.estimate? - truth));
+        Self {
+            recorded,
+            intervals: Held::new(found.iter()),
+            rms: rms(errors),
+            standard_error: mean(found.iter().filter_map(|(_, wheel, _)| wheel.standard_error)),
+        }
+    }
 }
 
 /// The whole population.

@@ -7,8 +7,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 use super::changing::{Changed, DriverChanges, driven_changing};
 use haptic_batch::StudyError;
-use haptic_batch::experiment::ExperimentPlan;
-use haptic_batch::experiment::scenario_of_drive;
+use haptic_batch::experiment::{ExperimentPlan, scenario_of_drive};
 use haptic_sim::participants::PublishedDriver;
 
 /// What changes.

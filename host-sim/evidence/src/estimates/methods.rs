@@ -11,9 +11,7 @@ use super::corruption::{Corruption, POPULATION, corrupted_log};
 use super::repetitions::bound_of;
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, each};
-use haptic_batch::experiment::ExperimentPlan;
-use haptic_batch::experiment::{COMPARED, compared};
-use haptic_batch::experiment::{driven, guided};
+use haptic_batch::experiment::{COMPARED, ExperimentPlan, compared, driven, guided};
 use haptic_batch::statistics::rms;
 
 /// The ways.

@@ -16,18 +16,15 @@ use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::torsion_bar::{ColumnKind, ColumnParameters};
 use haptic_sim::participants::PublishedDriver;
 use haptic_sim::simulation;
+use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
-use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
-use super::corruptions::{CorruptionLine, Corruptions, Held};
+use super::corruption::random_of;
+use super::corruptions::{CorruptionLine, Corruptions, Held, SoughtWheel};
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, each};
-use haptic_batch::experiment::ExperimentPlan;
-use haptic_batch::experiment::{COMPARED, Compared, compared};
-use haptic_batch::experiment::{guided, scenario_of_drive};
-use haptic_batch::statistics::{mean, rms};
-use serde::Serialize;
+use haptic_batch::experiment::{COMPARED, Compared, ExperimentPlan, compared, guided, scenario_of_drive};
 
 /// How a drive is recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -181,38 +178,6 @@ pub const CHANNELS: [(&str, Channel); 22] = [
     ),
 ];
 
-/// What was made of the inertia of a wheel that was sought.
-#[derive(Debug, Clone, Serialize)]
-pub struct SoughtWheel {
-    /// How the drives were recorded.
-    pub recorded: &'static str,
-    /// Drives whose inertia was identified, and how many of their 95 % intervals hold it.
-    pub intervals: Held,
-    /// Root mean square of their errors, kg.m2.
-    pub rms: Option<f64>,
-    /// Mean of their standard errors, kg.m2.
-    pub standard_error: Option<f64>,
-}
-
-impl SoughtWheel {
-    fn new(recorded: &'static str, truth: f64, fits: &[([Compared; COMPARED], Identification)]) -> Self {
-        let sought = fits.iter().flat_map(|(_, fit)| &fit.beyond);
-        let found: Vec<Compared> = sought
-            .filter(|(name, wheel)| *name == "wheel_inertia" && wheel.identified)
-            .map(|&(name, wheel)| (name, wheel, truth))
-            .collect();
-        let errors = found
-            .iter()
-            .filter_map(|(_, wheel, _)| Some(wheel.estimate? - truth));
-        Self {
-            recorded,
-            intervals: Held::new(found.iter()),
-            rms: rms(errors),
-            standard_error: mean(found.iter().filter_map(|(_, wheel, _)| wheel.standard_error)),
-        }
-    }
-}
-
 /// Records the guided drives of `plan` with `seeds` seeds from its own on by each of [`CHANNELS`], and identifies each as `identify
 /// --layout openlka` does. The corruptions of the result are the channels; no
 /// information bound is given for them. What is promised is promised of those whose wheel is told rightly or not at all;
@@ -227,12 +192,7 @@ pub fn recordings(plan: &ExperimentPlan, seeds: u32, watch: &Watch<'_>) -> Resul
         let usual = truth.parameters();
         let drive = |channel: &Channel, driver| channel.driven(plan, (number, &truth, seed), driver);
         let of_rigid = [drive(&ROAD, usual)?, drive(&PROBED, usual)?];
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(
-            plan.seed
-                .wrapping_add(seed)
-                .wrapping_mul(100)
-                .wrapping_add(u64::from(number)),
-        );
+        let mut random = random_of(&plan.repetition(seed), number);
         let fit = |(_, channel): &(&str, Channel)| {
             let mut driver = usual;
             if channel.other_arm {
@@ -384,6 +344,7 @@ impl Channel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
 
     /// Every row of a drive that is a straight line, by hand: 1 N.m and 0.2 rad/s2 at a wheel of 0.04 kg.m2 are 0.992 N.m, which is
     /// 0.99 in steps of 0.01; 0.1 rad are 5.7296 deg, 5.75 in steps of 1/16; lines 0.3 m to the left of the car's are at 1.8 m; 0.04 rad/s

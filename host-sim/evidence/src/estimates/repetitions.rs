@@ -8,8 +8,9 @@ use serde::Serialize;
 use haptic_analysis::identify::{DriveLog, Identification, Options, identify_with_noise_model, information};
 use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, logs};
-use haptic_batch::experiment::{COMPARED, Compared, ExperimentPlan, compared, truth_of};
-use haptic_batch::experiment::{guided, scenario_of_drive};
+use haptic_batch::experiment::{
+    COMPARED, Compared, ExperimentPlan, compared, guided, scenario_of_drive, truth_of,
+};
 use haptic_batch::statistics::{mean, rms};
 use haptic_sim::participants::PublishedDriver;
 

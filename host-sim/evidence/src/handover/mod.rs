@@ -24,11 +24,9 @@ pub use bend::{Bend, Side};
 use instants::{Instant, instants, row};
 pub use results::{Figure, HandoverResults, HandoverRow, MOST_BESIDE_DROP, Place};
 
-use haptic_batch::Away;
-use haptic_batch::StudyError;
 use haptic_batch::engine::{Watch, runs};
 use haptic_batch::paper::DRIVERS_T_P;
-use haptic_batch::peak_m;
+use haptic_batch::{Away, StudyError, peak_m};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario};

@@ -150,11 +150,11 @@ impl Segment {
     }
 
     /// The torque so many rows ahead of each row that has its history, on what `of` takes from that row.
-    fn samples(&self, ahead: usize, of: impl Fn(&Stretch, usize) -> Vec<f64>) -> Samples {
+    fn samples(&self, ahead: usize, of: impl Fn(&Self, &Stretch, usize) -> Vec<f64>) -> Samples {
         let from = self.rows(HISTORY);
         let rows = self.stretches.iter().flat_map(|stretch| {
             let until = stretch.torque.len().saturating_sub(ahead);
-            (from..until).map(|k| (of(stretch, k), stretch.torque[k + ahead]))
+            (from..until).map(|k| (of(self, stretch, k), stretch.torque[k + ahead]))
         });
         centred(rows.collect())
     }
@@ -288,10 +288,7 @@ fn judged(model: Model, ahead_s: Option<f64>, segments: &[Samples], predicted: &
 /// Models of the torque of now.
 fn now(segments: &[Segment]) -> Option<Vec<Judged>> {
     let samples = |of: &dyn Fn(&Segment, &Stretch, usize) -> Vec<f64>| -> Vec<Samples> {
-        let samples = segments
-            .iter()
-            .map(|s| s.samples(0, |stretch, k| of(s, stretch, k)));
-        samples.collect()
+        segments.iter().map(|s| s.samples(0, of)).collect()
     };
     let column = samples(&|_, stretch, k| stretch.column[k].clone());
     let driver = samples(&|s, stretch, k| DRIVER.map(|steps| stretch.road[k - s.rows(steps)]).concat());
@@ -330,10 +327,7 @@ fn ahead(segments: &[Segment], ahead_s: f64) -> Option<Vec<Judged>> {
             .collect()
     };
     let samples = |of: &dyn Fn(&Segment, &Stretch, usize) -> Vec<f64>| -> Vec<Samples> {
-        let samples = segments
-            .iter()
-            .map(|s| s.samples(far(s), |stretch, k| of(s, stretch, k)));
-        samples.collect()
+        segments.iter().map(|s| s.samples(far(s), of)).collect()
     };
     let last = samples(&|s, stretch, k| past(s, stretch, k, &[0]));
     let own = samples(&|s, stretch, k| past(s, stretch, k, &PAST));
