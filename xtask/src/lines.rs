@@ -29,7 +29,7 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("host-sim/engine", 1_280),
     ("host-sim/evidence", 7_730),
     ("host-sim/input", 370),
-    ("host-sim/log", 5_810),
+    ("host-sim/log", 5_800),
     ("host-sim/metrics", 560),
     ("host-sim/pil", 2_360),
     ("host-sim/recording", 2_210),

@@ -40,21 +40,11 @@ impl<W: Write + Seek> Writer<W> {
         let [start_ms, stop_ms] = self.span_ms.get_or_insert([now_ms; 2]);
         *stop_ms = now_ms;
         let since_ns = time_ns.saturating_sub(*start_ms * 1_000_000);
-        let channel = self.numbers.of(&frame.bus).to_le_bytes();
-        let id = (frame.id | if frame.extended { EXTENDED } else { 0 }).to_le_bytes();
+        let id = frame.id | if frame.extended { EXTENDED } else { 0 };
         let length = frame.data.len() as u8;
-        let code = length_code(frame.data.len());
-        let head = [
-            channel[0],
-            channel[1],
-            u8::from(frame.sent),
-            code,
-            id[0],
-            id[1],
-            id[2],
-            id[3],
-        ];
-        let mut body = head.to_vec();
+        let mut body = self.numbers.of(&frame.bus).to_le_bytes().to_vec();
+        body.extend([u8::from(frame.sent), length_code(frame.data.len())]);
+        body.extend(id.to_le_bytes());
         let kind = match frame.form {
             Form::Classic => CAN_MESSAGE,
             Form::Fd { switched, passive } => {
