@@ -3,19 +3,14 @@
 
 use anyhow::Result;
 
-use crate::golden::{self, Figure};
+use crate::golden::{self, figure};
 use crate::{callgrind, tool};
 
 pub(crate) fn run(bless: bool) -> Result<()> {
     tool::ensure(&[("valgrind", "valgrind")])?;
     let host = callgrind::count()?;
-    let figure = |name: &str, value| Figure {
-        name: name.to_owned(),
-        unit: "instructions",
-        value,
-        // The C library picks its memcpy, sine and cosine by the processor.
-        tolerance_percent: 5,
-    };
+    // The C library picks its memcpy, sine and cosine by the processor.
+    let figure = |name: &str, value| figure(name, "instructions", value, 5);
     golden::check(
         &[
             figure("host_step_mean", host.per_step),

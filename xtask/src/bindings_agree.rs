@@ -20,7 +20,7 @@ const INPUTS: [&str; 4] = ["100", "110", "120", "130"];
 /// Prints the table, and fails where a door sends another bit.
 pub(crate) fn check(built: Built) -> Result<()> {
     let out = root().join("target/bindings-agree/run");
-    run(command(&built.host_sim()?.to_string_lossy())
+    run(command(built.host_sim()?)
         .args(["run", SCENARIO, "--bus-log", "--out"])
         .arg(&out)
         .stdout(Stdio::null()))?;
@@ -30,7 +30,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
     in_python.arg("bindings/python/replay.py");
     let mut simulated = python::with_package(built)?;
     simulated.arg("bindings/python/simulated.py").arg(SCENARIO);
-    let in_c = command(&c_library::replay(built)?.to_string_lossy());
+    let in_c = command(c_library::replay(built)?);
     println!("{SCENARIO}, frames that the controller sent\n");
     println!("{:<20} {:>9} {:>9}", "door", "frames", "differing");
     println!("{:<20} {:>9} {:>9}", "command line", expected.len(), "-");

@@ -10,12 +10,10 @@ use serde_json::Value;
 
 use crate::built::Built;
 use crate::code::{CONTROLLER, Code, PRODUCT};
-use crate::golden::{self, Figure};
+use crate::golden::{self, Figure, figure};
 use crate::image::{self, Image, M4F};
-use crate::longest;
-use crate::seal;
-use crate::size;
 use crate::tool::{self, Usage, cargo, run};
+use crate::{longest, seal, size};
 
 /// Length of the guard below the stack (`firmware/src/stack.rs`): a larger frame could step over it.
 const GUARD: u64 = 8192;
@@ -204,15 +202,6 @@ impl Figure {
     }
 }
 
-fn figure(name: &str, unit: &'static str, value: u64, tolerance_percent: u64) -> Figure {
-    Figure {
-        name: name.to_owned(),
-        unit,
-        value,
-        tolerance_percent,
-    }
-}
-
 /// What an image takes, and that its torque path is clean.
 fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
     let size = size::read(elf)?;
@@ -271,7 +260,7 @@ fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
 
 /// The worst step of any row of the fault campaign: of those whose frames a bus can carry, and of all.
 fn under_faults(built: Built) -> Result<Vec<Figure>> {
-    let text = tool::output(&mut tool::command(&built.worst_step()?.to_string_lossy()))?;
+    let text = tool::output(&mut tool::command(built.worst_step()?))?;
     let report: Value = serde_json::from_str(&text).context("bench/worst_step.rs")?;
     let rows = report["rows"].as_array().context("worst_step counted no row")?;
     let mut figures = Vec::new();
@@ -297,7 +286,7 @@ fn under_faults(built: Built) -> Result<Vec<Figure>> {
 
 /// What authentication takes, in the drive whose steps take most.
 fn with_keys(built: Built) -> Result<Vec<Figure>> {
-    let mut cost = tool::command(&built.host_sim()?.to_string_lossy());
+    let mut cost = tool::command(built.host_sim()?);
     let text = tool::output(cost.args(["ecu", "cost", "--json", EVENTFUL[0]]))?;
     let costs: Value = serde_json::from_str(&text).context("host-sim ecu cost --json")?;
     let drives = costs["drives"]
@@ -345,7 +334,7 @@ impl Spent {
 
 fn in_lock_step(board: Board, built: Built, scenario: &str) -> Result<Spent> {
     let text = tool::output(
-        tool::command(&built.host_sim()?.to_string_lossy())
+        tool::command(built.host_sim()?)
             .args(["ecu", "pil"])
             .args(["--machine", board.feature(), "--count", "--json"])
             .arg(scenario),
@@ -388,7 +377,7 @@ pub(crate) fn bench(board: Board) -> Result<()> {
 
 /// The comparison of `host-sim ecu pil`, with the board in QEMU's place.
 pub(crate) fn hil(options: &Hil) -> Result<()> {
-    let mut pil = tool::command(&Built::ToShip.host_sim()?.to_string_lossy());
+    let mut pil = tool::command(Built::ToShip.host_sim()?);
     pil.args(["ecu", "pil"]);
     match (&options.can, options.board.chip()) {
         (None, None) => pil.args(["--machine", options.board.feature()]),

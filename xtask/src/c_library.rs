@@ -38,7 +38,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
     let target = target_library(&dist)?;
     header()?;
     parameters(&dist, &host)?;
-    let native = output(&mut command(&example(&dist, "main", &host)?.to_string_lossy()))?;
+    let native = output(&mut command(example(&dist, "main", &host)?))?;
     print!("{native}");
     let image = image(&dist, &target)?;
     let in_qemu = output(
@@ -108,7 +108,7 @@ fn parameters(dist: &Path, library: &Path) -> Result<()> {
         .map(|(name, _)| format!("CHECK({})\n", name.trim()));
     std::fs::write(dist.join("every_parameter.h"), checks.collect::<String>())?;
     let program = program(dist, "bindings/c/parameters.c", library)?;
-    print!("{}", output(&mut command(&program.to_string_lossy()))?);
+    print!("{}", output(&mut command(program))?);
     Ok(())
 }
 

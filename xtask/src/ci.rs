@@ -407,11 +407,9 @@ fn campaign() -> Result<()> {
     let evidence = Built::ForTests.evidence()?;
     let seeds = ["faults", "--seeds", "500"];
     // The paper's drivers in the paper's world, then those who keep the lane in a real one.
-    run(command(&evidence.to_string_lossy()).args(seeds))?;
+    run(command(&evidence).args(seeds))?;
     for world in ["calibrated", "everything", "braking", "camera"] {
-        run(command(&evidence.to_string_lossy())
-            .args(seeds)
-            .args(["--world", world]))?;
+        run(command(&evidence).args(seeds).args(["--world", world]))?;
     }
     Ok(())
 }

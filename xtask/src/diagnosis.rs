@@ -12,7 +12,6 @@ use crate::venv;
 pub(crate) fn check(built: Built) -> Result<()> {
     tool::ensure(&[("qemu-system-arm", "qemu-system-arm")])?;
     let (host_sim, python) = (built.host_sim()?, venv::environment()?);
-    let python = python.to_string_lossy();
     for check in ["check_pdx.py", "check_diagnosis.py"] {
         run(command(&python)
             .arg(format!("tests/tools/{check}"))

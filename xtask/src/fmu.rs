@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime};
 use anyhow::{Context, Result};
 
 use crate::built::Built;
-use crate::tool::{cargo, command, exists, output, root, run};
+use crate::tool::{below, cargo, command, exists, output, root, run};
 use crate::{dist, python};
 
 /// A relying driver on the paper's course, as bindings/fmu/check.py couples it.
@@ -22,7 +22,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
     let run_directory = root().join("target/fmu/run");
     let scenario = root().join("target/fmu/coupled.toml");
     std::fs::write(&scenario, SCENARIO)?;
-    run(command(&built.host_sim()?.to_string_lossy())
+    run(command(built.host_sim()?)
         .arg("run")
         .arg(&scenario)
         .arg("--out")
@@ -70,7 +70,6 @@ pub(crate) fn build(built: Built) -> Result<Vec<PathBuf>> {
     let native = built.package("haptic-fmu")?;
     let binaries = binaries(&native)?;
     let describe = native.join("model-description");
-    let describe = describe.to_string_lossy();
     let models = output(&mut command(&describe))?;
     let dist = root().join("target/dist");
     std::fs::create_dir_all(&dist)?;
@@ -98,19 +97,6 @@ pub(crate) fn build(built: Built) -> Result<Vec<PathBuf>> {
         }
     }
     Ok(fmus)
-}
-
-/// Files and folders in a folder, and in those in it.
-fn below(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
-        let path = entry?.path();
-        if path.is_dir() {
-            found.extend(below(&path)?);
-        }
-        found.push(path);
-    }
-    Ok(found)
 }
 
 /// An FMU is a zip archive; Python, which checks it, can write one.

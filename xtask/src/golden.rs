@@ -20,6 +20,15 @@ pub(crate) struct Figure {
     pub(crate) tolerance_percent: u64,
 }
 
+pub(crate) fn figure(name: &str, unit: &'static str, value: u64, tolerance_percent: u64) -> Figure {
+    Figure {
+        name: name.to_owned(),
+        unit,
+        value,
+        tolerance_percent,
+    }
+}
+
 fn path() -> PathBuf {
     tool::root().join("xtask/golden.json")
 }

@@ -24,7 +24,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
     std::fs::create_dir_all(&place)?;
     let host_sim = built.host_sim()?;
     let whole = place.join("run");
-    run(command(&host_sim.to_string_lossy())
+    run(command(&host_sim)
         .args(["run", SCENARIO, "--bus-log", "--out"])
         .arg(&whole)
         .stdout(std::process::Stdio::null()))?;
@@ -39,7 +39,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
         Ok(short)
     };
     let (csv, bus) = (head("run.csv", ROWS)?, head("bus.log", FRAMES)?);
-    run(command(&venv::environment()?.to_string_lossy())
+    run(command(venv::environment()?)
         .arg("host-sim/log/peers/check.py")
         .args([&host_sim, &place, &csv, &bus])
         .arg(DRIVE))
@@ -53,7 +53,7 @@ pub(crate) fn published(built: Built) -> Result<()> {
     for (name, version) in PUBLISHED {
         let unpacked = place.join(format!("{}-{version}", name.replace('-', "_")));
         if !unpacked.exists() {
-            run(command(&python.to_string_lossy())
+            run(command(&python)
                 .args("-m pip download -q --disable-pip-version-check --no-deps".split(' '))
                 .args(["--no-binary", name, &format!("{name}=={version}"), "-d"])
                 .arg(&place))?;
@@ -61,7 +61,7 @@ pub(crate) fn published(built: Built) -> Result<()> {
             run(command("tar").arg("xzf").arg(archive).arg("-C").arg(&place))?;
         }
     }
-    run(command(&python.to_string_lossy())
+    run(command(&python)
         .arg("host-sim/log/peers/published.py")
         .args([&built.host_sim()?, &place]))
 }

@@ -202,14 +202,8 @@ fn main() -> ExitCode {
             board: Some(board), ..
         } => boards::bench(board),
         Command::Bench { bless, .. } => bench::run(bless),
-        Command::Qemu(options) => match qemu::run(&options) {
-            Ok(code) => return code,
-            Err(error) => Err(error),
-        },
-        Command::Claim(claim) => match claim.run() {
-            Ok(code) => return code,
-            Err(error) => Err(error),
-        },
+        Command::Qemu(options) => return ended(qemu::run(&options)),
+        Command::Claim(claim) => return ended(claim.run()),
         Command::Trace { ran: true, .. } => trace::by_execution(&ci::logs()),
         Command::Trace { page: true, .. } => trace::page().map(|page| print!("{page}")),
         Command::Trace { .. } => trace::run(),
@@ -218,11 +212,12 @@ fn main() -> ExitCode {
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::from(if error.is::<tool::Usage>() { 2 } else { 1 })
-        }
-    }
+    ended(result.map(|()| ExitCode::SUCCESS))
+}
+
+fn ended(result: anyhow::Result<ExitCode>) -> ExitCode {
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(if error.is::<tool::Usage>() { 2 } else { 1 })
+    })
 }

@@ -30,5 +30,5 @@ pub(crate) fn workflows() -> Result<()> {
 pub(crate) fn program(environment: &str, packages: &[&str], name: &str) -> Result<Command> {
     let place = root().join("target/python").join(environment);
     venv::environment_of(&place, packages)?;
-    Ok(command(&place.join(venv::PROGRAMS).join(name).to_string_lossy()))
+    Ok(command(place.join(venv::PROGRAMS).join(name)))
 }

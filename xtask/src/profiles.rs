@@ -22,7 +22,7 @@ pub(crate) fn check() -> Result<()> {
         let program = root().join("target").join(folder).join("host-sim");
         let host_sim = |arguments: &[&str]| {
             let out = place.join(profile).join(arguments[0]);
-            run(command(&program.to_string_lossy())
+            run(command(&program)
                 .args(arguments)
                 .arg("--out")
                 .arg(out)

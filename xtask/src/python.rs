@@ -27,7 +27,7 @@ fn put(from: &Path, to: &Path) -> Result<()> {
 /// An interpreter that finds the package: that of the other tests' build beside its sources, or the installed wheel.
 pub(crate) fn with_package(built: Built) -> Result<Command> {
     if built == Built::ToShip {
-        return Ok(command(&wheel::installed()?.to_string_lossy()));
+        return Ok(command(wheel::installed()?));
     }
     let library = built.package("haptic-python")?.join("lib_native.so");
     let place = root().join("target/python/package");
@@ -40,7 +40,7 @@ pub(crate) fn with_package(built: Built) -> Result<Command> {
         }
     }
     put(&library, &package.join("_native.abi3.so"))?;
-    let mut python = command(&environment()?.to_string_lossy());
+    let mut python = command(environment()?);
     python.env("PYTHONPATH", place);
     Ok(python)
 }

@@ -13,7 +13,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
 use crate::built::Built;
-use crate::tool::{cargo, command, output, root, run};
+use crate::tool::{below, cargo, command, output, root, run};
 use crate::{policy, python, trace, web};
 
 /// What `cargo xtask site` is asked for.
@@ -143,16 +143,8 @@ fn copy(to: &Path) -> Result<()> {
 
 /// All files of a folder and of those in it.
 fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(folder).with_context(|| folder.display().to_string())? {
-        let path = entry?.path();
-        if path.is_dir() {
-            found.extend(files(&path)?);
-        } else {
-            found.push(path);
-        }
-    }
-    Ok(found)
+    let below = below(folder)?.into_iter();
+    Ok(below.filter(|path| !path.is_dir()).collect())
 }
 
 /// The command of a line that stands for what a command prints.
@@ -168,17 +160,13 @@ fn with_printed(text: &str) -> Result<String> {
             None => made.push_str(line),
             Some(REQUIREMENTS) => made.push_str(&trace::page()?),
             Some(FAULTS) => {
-                let program = Built::Daily.evidence()?;
-                made.push_str(&output(
-                    command(&program.to_string_lossy()).args(["faults", "--list"]),
-                )?);
+                let mut program = command(Built::Daily.evidence()?);
+                made.push_str(&output(program.args(["faults", "--list"]))?);
             }
             Some(listed) if listed.starts_with(NAMED) => {
-                let program = Built::Daily.host_sim()?;
+                let mut program = command(Built::Daily.host_sim()?);
                 let what = &listed[NAMED.len()..];
-                made.push_str(&output(
-                    command(&program.to_string_lossy()).args(["compare", "--list", what]),
-                )?);
+                made.push_str(&output(program.args(["compare", "--list", what]))?);
             }
             Some(other) => bail!("{other}: not a command that prints a table for the book"),
         }

@@ -1,5 +1,6 @@
 //! Running other programs, finding them, and saying which one is missing.
 
+use std::ffi::OsStr;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -15,11 +16,11 @@ pub(crate) fn root() -> &'static Path {
 
 /// Cargo, in the workspace's root.
 pub(crate) fn cargo() -> Command {
-    command(&std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
+    command(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
 }
 
 /// A program, in the workspace's root.
-pub(crate) fn command(program: &str) -> Command {
+pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
     command
@@ -87,6 +88,19 @@ fn describe(command: &Command) -> String {
         .join(" ")
 }
 
+/// Files and folders in a folder, and in those in it.
+pub(crate) fn below(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        if path.is_dir() {
+            found.extend(below(&path)?);
+        }
+        found.push(path);
+    }
+    Ok(found)
+}
+
 /// A program of rustup's component `llvm-tools`.
 pub(crate) fn llvm(name: &str) -> Result<Command> {
     let sysroot = output(command("rustc").args(["--print", "sysroot"]))?;
@@ -97,7 +111,7 @@ pub(crate) fn llvm(name: &str) -> Result<Command> {
         .map(|target| target.path().join("bin").join(name))
         .find(|path| path.is_file());
     match path {
-        Some(path) => Ok(command(&path.to_string_lossy())),
+        Some(path) => Ok(command(path)),
         None => bail!("{name} is missing: rustup component add llvm-tools"),
     }
 }

@@ -38,7 +38,7 @@ pub(crate) fn environment_of(place: &Path, packages: &[&str]) -> Result<PathBuf>
     if std::fs::read_to_string(&installed).is_ok_and(|there| there == list) {
         return Ok(python);
     }
-    run(command(&python.to_string_lossy())
+    run(command(&python)
         .args("-m pip install -q --disable-pip-version-check".split(' '))
         .args(packages))?;
     std::fs::write(&installed, list)?;

@@ -74,7 +74,7 @@ fn try_it(built: Built) -> Result<()> {
         (&["run", bar], "bar"),
         (&["evaluate"], "evaluation"),
     ] {
-        run(command(&host_sim.to_string_lossy())
+        run(command(&host_sim)
             .args(arguments)
             .arg("--out")
             .arg(place.join(out))
@@ -83,7 +83,7 @@ fn try_it(built: Built) -> Result<()> {
     }
     let python = venv::environment_of(&root().join("target/python/page"), &AXE)?;
     let find = "import axe_playwright_python as a; print(a.__path__[0] + '/axe.min.js')";
-    let axe = output(command(&python.to_string_lossy()).args(["-c", find]))?;
+    let axe = output(command(&python).args(["-c", find]))?;
     let results = |out: &str| place.join(out).join("results.json");
     let log = |out: &str| place.join(out).join("run.csv");
     let report = output(

@@ -72,10 +72,10 @@ pub(crate) fn build(options: &Options) -> Result<()> {
     if options.test || options.bench {
         let python = install(&wheel)?;
         if options.test {
-            run(command(&python.to_string_lossy()).args(["-m", "pytest", "bindings/python"]))?;
+            run(command(&python).args(["-m", "pytest", "bindings/python"]))?;
         }
         if options.bench {
-            run(command(&python.to_string_lossy()).arg("bindings/python/bench.py"))?;
+            run(command(&python).arg("bindings/python/bench.py"))?;
         }
     }
     Ok(())
@@ -110,7 +110,7 @@ fn pack(dist: &Path, built: Built) -> Result<()> {
     let scripts = root().join(DATA).join("scripts");
     std::fs::create_dir_all(&scripts).with_context(|| scripts.display().to_string())?;
     let program = scripts.join(HOST_SIM);
-    let mut maturin = command(&dist::tools()?.join("maturin").to_string_lossy());
+    let mut maturin = command(dist::tools()?.join("maturin"));
     maturin
         .args("build -m bindings/python/Cargo.toml --out".split(' '))
         .arg(dist);
@@ -167,7 +167,7 @@ pub(crate) fn look_at_crates() -> Result<()> {
 fn install(wheel: &Path) -> Result<PathBuf> {
     let python = venv::environment_of(&root().join("target/python/wheel"), &venv::PACKAGES)?;
     let fresh = ["-m", "pip", "install", "-q", "--force-reinstall", "--no-deps"];
-    run(command(&python.to_string_lossy()).args(fresh).arg(wheel))?;
+    run(command(&python).args(fresh).arg(wheel))?;
     Ok(python)
 }
 

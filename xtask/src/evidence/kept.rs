@@ -209,9 +209,9 @@ impl Kept {
         let numbers = match origin.rule {
             Rule::Seeds(_) => Numbers::Campaign(Campaign {
                 sums: next(&mut lines)?,
-                rows: rest(lines)?,
+                rows: lines.map(read).collect::<Result<_>>()?,
             }),
-            Rule::Hours(_) => Numbers::Availability(rest(lines)?),
+            Rule::Hours(_) => Numbers::Availability(lines.map(read).collect::<Result<_>>()?),
         };
         Ok(Self { origin, numbers })
     }
@@ -250,15 +250,9 @@ impl Kept {
 }
 
 fn next<'a, T: DeserializeOwned>(lines: &mut impl Iterator<Item = (usize, &'a str)>) -> Result<T> {
-    let (number, line) = lines.next().context("it ends too early")?;
-    serde_json::from_str(line).with_context(|| format!("line {}", number + 1))
+    read(lines.next().context("it ends too early")?)
 }
 
-fn rest<'a, T: DeserializeOwned>(lines: impl Iterator<Item = (usize, &'a str)>) -> Result<Vec<T>> {
-    let mut lines = lines.peekable();
-    let mut all = Vec::new();
-    while lines.peek().is_some() {
-        all.push(next(&mut lines)?);
-    }
-    Ok(all)
+fn read<T: DeserializeOwned>((number, line): (usize, &str)) -> Result<T> {
+    serde_json::from_str(line).with_context(|| format!("line {}", number + 1))
 }

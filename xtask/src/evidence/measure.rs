@@ -145,7 +145,6 @@ pub(super) fn same(list: &List, names: &[String], then: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The commit of a tree that does not differ from it but in the documents, which this command writes.
 /// Whether two results are the same to nine digits, which is more than any document shows: another order of a sum changes the
 /// last ones.
 fn are_alike(then: &Value, now: &Value) -> bool {
@@ -165,6 +164,7 @@ fn are_alike(then: &Value, now: &Value) -> bool {
     }
 }
 
+/// The commit of a tree that does not differ from it but in the documents, which this command writes.
 fn clean_commit() -> Result<String> {
     let differing = output(command("git").args(["status", "--porcelain", "--", ".", ":!docs"]))?;
     ensure!(
@@ -281,7 +281,7 @@ struct Drives {
 impl Run<'_> {
     /// Every row that runs there, some at a time: they do not depend on each other.
     fn campaign(&self) -> Result<(Vec<Row>, Option<f64>)> {
-        let table = output(command(&self.program.to_string_lossy()).args(["faults", "--list"]))?;
+        let table = output(command(self.program).args(["faults", "--list"]))?;
         let has_bar = self.arguments.contains("--world bar");
         let names = rows_of(&table, self.arguments.contains("--target"), has_bar);
         ensure!(!names.is_empty(), "{PROGRAM} faults --list has no rows");
@@ -327,7 +327,7 @@ impl Run<'_> {
         if let Ok(text) = fs::read_to_string(&path) {
             return Ok(text);
         }
-        let mut run = command(&self.program.to_string_lossy());
+        let mut run = command(self.program);
         run.args(self.arguments.split(' ')).args(more).arg("--json");
         let said = run.stderr(std::process::Stdio::inherit()).output();
         let said = said.with_context(|| self.arguments.clone())?;

@@ -63,7 +63,7 @@ fn try_it(unpacked: &Path) -> Result<()> {
         .args(link)
         .arg("-o")
         .arg(&example))?;
-    let said = output(&mut command(&example.to_string_lossy()))?;
+    let said = output(&mut command(example))?;
     let last = said.lines().last().context("the example says nothing")?;
     ensure!(!last.is_empty(), "the example ends with an empty line");
     println!("an example built by pkg-config says {last:?}");

@@ -68,7 +68,7 @@ pub(super) fn wheel(release: &Release) -> Result<()> {
     let environment = place.join("environment");
     run(command("python3").args(["-m", "venv"]).arg(&environment))?;
     let programs = environment.join(venv::PROGRAMS);
-    run(command(&programs.join("python").to_string_lossy())
+    run(command(programs.join("python"))
         .args("-m pip install -q --disable-pip-version-check --no-index --no-deps".split(' '))
         .arg(&wheel))?;
     let program = programs.join(HOST_SIM);

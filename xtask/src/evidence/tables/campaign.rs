@@ -21,14 +21,9 @@ const CLASSES: [(&str, &str); 6] = [
 pub(super) fn campaigns(columns: &Columns) -> Vec<String> {
     let row = |(title, kept): &(&str, Option<&Kept>)| {
         let Some((kept, campaign)) = kept.and_then(|kept| Some((kept, kept.campaign()?))) else {
-            return vec![
-                (*title).into(),
-                NOTHING.into(),
-                "".into(),
-                "".into(),
-                "".into(),
-                "".into(),
-            ];
+            let mut cells = vec![(*title).into(), NOTHING.into()];
+            cells.resize(6, String::new());
+            return cells;
         };
         let sums = &campaign.sums;
         let failed = match sums.rows_beyond_share {
@@ -156,7 +151,7 @@ pub(super) fn classes(columns: &Columns) -> Vec<String> {
             format!("{worst:.2}, {}", percent(left, runs))
         })
     });
-    lines(&head(&["class", "rows"], columns), rows.collect::<Vec<_>>())
+    lines(&head(&["class", "rows"], columns), rows)
 }
 
 /// Rows of all columns, in the order of the first that has any.
@@ -191,15 +186,13 @@ pub(super) fn pushed(columns: &Columns) -> Vec<String> {
             Some(ms) => format!("{pushed_m:.2}, {}", count(ms.into())),
         },
     };
-    let rows = named
-        .iter()
-        .map(|name| row(&format!("`{name}`"), columns, |of| cell(of.row(name))));
     let others = row("every other row of class C", columns, |of| {
         let others = of.rows.iter().filter(|row| !named.contains(&row.name));
         let most = others.filter_map(|row| row.pushed_m).fold(0.0, f64::max);
         format!("{most:.2}")
     });
-    lines(&head(&["row"], columns), rows.chain([others]).collect::<Vec<_>>())
+    let rows = rows_of(&named, columns, cell).chain([others]);
+    lines(&head(&["row"], columns), rows)
 }
 
 impl Latent {
@@ -270,10 +263,7 @@ pub(super) fn latent(columns: &Columns, which: &Latent) -> Vec<String> {
         format!("{share:.0} ({low:.0} to {high:.0}), {median}, {worst:.2}")
     };
     let named = names(columns, |row, _| which.was(row));
-    let rows = named
-        .iter()
-        .map(|name| row(&format!("`{name}`"), columns, |of| cell(of.row(name))));
-    lines(&head(&["fault"], columns), rows.collect::<Vec<_>>())
+    lines(&head(&["fault"], columns), rows_of(&named, columns, cell))
 }
 
 pub(super) fn left(columns: &Columns, rows: &[String]) -> Vec<String> {
@@ -284,13 +274,18 @@ pub(super) fn left(columns: &Columns, rows: &[String]) -> Vec<String> {
             Some([median, _]) => format!("{} of {}, {:.2} s", row.left, row.runs, f64::from(median) * 1e-3),
         },
     };
-    let rows = rows
-        .iter()
-        .map(|name| row(&format!("`{name}`"), columns, |of| cell(of.row(name))));
-    lines(
-        &head(&["the ECU left, after (median)"], columns),
-        rows.collect::<Vec<_>>(),
-    )
+    let head = head(&["the ECU left, after (median)"], columns);
+    lines(&head, rows_of(rows, columns, cell))
+}
+
+/// A row for each name, with a cell of each campaign's row of this name.
+fn rows_of(
+    names: &[String],
+    columns: &Columns,
+    cell: impl Fn(Option<&Row>) -> String,
+) -> impl Iterator<Item = Vec<String>> {
+    let row = move |name: &String| row(&format!("`{name}`"), columns, |of| cell(of.row(name)));
+    names.iter().map(row)
 }
 
 /// A row with a cell of each campaign.
