@@ -326,7 +326,8 @@ pub fn halved([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn(f64) -
     high
 }
 
-/// Likewise with the span of the logarithms: the last value found at which it holds, and the first at which it does not.
+/// Where something that holds below ends to hold, by so many halvings of the span of the logarithms: the last value found at which it
+/// holds, and the first at which it does not.
 pub fn halved_by_ratio([mut low, mut high]: [f64; 2], times: usize, holds: impl Fn(f64) -> bool) -> [f64; 2] {
     for _ in 0..times {
         let middle = (low * high).sqrt();

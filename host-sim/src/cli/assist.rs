@@ -12,7 +12,7 @@ use haptic_sim::input::in_range;
 
 use super::progress::Threads;
 use super::results::{LevelArgument, ResultArguments};
-use super::{BadInput, Outcome, in_file, progress};
+use super::{BadInput, Outcome, in_file};
 
 /// Which column.
 #[derive(Debug, Args)]
@@ -72,9 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
 
 /// What a study finds, on so many threads.
 fn driven<S: Study<Results: Send>>(study: &S, unit: &str, threads: &Threads) -> Result<S::Results, BadInput> {
-    Ok(progress::watched(unit, |watch| {
-        threads.run(|| study.run(watch))
-    })??)
+    Ok(threads.watched(unit, |watch| study.run(watch))??)
 }
 
 /// The ECU's last reading of K_hg.
