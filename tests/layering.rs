@@ -78,10 +78,7 @@ const STUDIES: Arrows = &[
 ];
 
 /// Modules that use each other.
-const CIRCLES: [&str; 2] = [
-    "host-sim/evidence: estimates::corruptions and estimates::recordings",
-    "host-sim/sim: models::torsion_bar::exact and models::torsion_bar::plant",
-];
+const CIRCLES: [&str; 1] = ["host-sim/sim: models::torsion_bar::exact and models::torsion_bar::plant"];
 
 /// What only the engine of the studies uses: threads, and runs side by side.
 const ENGINES_OWN: [&str; 2] = ["rayon", "haptic_vectorised"];
