@@ -580,6 +580,10 @@ fn lines_are_counted_without_tests_comments_and_blanks() {
     assert_eq!(lines::of_source(text), 4);
     let tested = "#[cfg(test)]\nmod tests;\n\n#[cfg(test)]\n#[path = \"x.rs\"]\nmod tests {\n    fn f() {\n    }\n}\nfn h() {}\n";
     assert_eq!(lines::of_source(tested), 1);
+    let with_a_text = "#[cfg(test)]\nmod tests {\n    const T: &str = r\"\nfn g() {}\nuse a;\n\";\n    fn f() {}\n}\nfn h() {}\n";
+    assert_eq!(lines::of_source(with_a_text), 1);
+    let elsewhere = "#[cfg(test)]\n#[path = \"x.rs\"]\nmod tests;\nfn h() {}\nfn i() {}\n";
+    assert_eq!(lines::of_source(elsewhere), 2);
     let inside = "impl A {\n    #[cfg(test)]\n    fn only(\n        x: u8,\n    ) -> u8 {\n        x\n    }\n    fn kept() {}\n}\n";
     assert_eq!(lines::of_source(inside), 3);
 }

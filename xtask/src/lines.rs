@@ -38,7 +38,7 @@ pub(crate) const BUDGETS: [(&str, usize); 30] = [
     ("host-sim/sim", 6_930),
     ("host-sim/vectorised", 2_790),
     ("host-sim/vehicle", 1_670),
-    ("xtask", 7_250),
+    ("xtask", 7_070),
     ("xtask/log", 100),
 ];
 
@@ -72,20 +72,20 @@ fn of_crate(place: &Path) -> io::Result<usize> {
 /// Lines of code of a source.
 pub(crate) fn of_source(text: &str) -> usize {
     let mut lines = 0;
-    // Of a test: how far its attribute is indented.
-    let mut test: Option<usize> = None;
+    // Of a test: how far its attribute is indented, and whether its first line was seen, which may be all of it. A text within it may
+    // begin where it begins.
+    let mut test: Option<(usize, bool)> = None;
     for line in text.lines() {
         let code = line.trim_start();
         let indent = line.len() - code.len();
         if code.is_empty() || code.starts_with("//") {
             continue;
         }
-        if let Some(at) = test {
-            if indent == at && (code.starts_with('}') || code.ends_with([';', '}'])) {
-                test = None;
-            }
+        if let Some((at, is_inside)) = test {
+            let ends = code == "}" || !is_inside && code.ends_with([';', '}']);
+            test = (indent != at || !ends).then_some((at, is_inside || !code.starts_with("#[")));
         } else if code.starts_with("#[cfg(test)]") {
-            test = Some(indent);
+            test = Some((indent, false));
         } else {
             lines += 1;
         }
