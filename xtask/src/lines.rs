@@ -72,7 +72,7 @@ fn of_crate(place: &Path) -> io::Result<usize> {
 /// Lines of code of a source.
 pub(crate) fn of_source(text: &str) -> usize {
     let mut lines = 0;
-    // Of a test: how far its attribute is indented, and whether its first line was seen, which may be all of it. A text within it may
+    // Within a test: how far its attribute is indented, and whether its first line was seen, which may be all of it. A text within it may
     // begin where it begins.
     let mut test: Option<(usize, bool)> = None;
     for line in text.lines() {

@@ -176,7 +176,7 @@ impl DriveLog {
     /// that they lie on is read.
     ///
     /// # Errors
-    /// As [`DriveLog::read`].
+    /// What [`DriveLog::read`] refuses.
     pub fn read_within(source: impl Read, manual: bool, stretches: &[(f64, f64)]) -> Result<Self, LogError> {
         let how = bus_trace::Recording {
             manual,
