@@ -65,6 +65,8 @@ enum Width {
     Share(f64),
     /// In the quantity's unit.
     Plain(f64),
+    /// In the unit of a value that is never below zero, where an interval ends.
+    NotNegative(f64),
 }
 
 /// What a quantity is made of: what is known, the parameters, a speed.
@@ -99,7 +101,7 @@ const fn of(
 }
 
 use Part::{Column, Vehicle};
-use Width::{Plain, Share};
+use Width::{NotNegative, Plain, Share};
 
 /// In the order of the table.
 #[rustfmt::skip]
@@ -115,7 +117,7 @@ pub(super) const QUANTITIES: [Definition; 15] = [
     of(Vehicle, "l_f", "m", "centre of gravity to the front axle", Share(0.1), |k, x, _| Physical::of(k, x).l_f),
     of(Column, "j_s", "kg.m2", "inertia of the column", Share(0.2), |_, x, _| x[P::J_S].exp()),
     of(Column, "b_s", "N.m.s/rad", "damping of the column", Share(0.2), |_, x, _| x[P::B_S].exp()),
-    of(Column, "friction", "N.m", "dry friction of the column", Plain(0.1), |_, x, _| x[P::FRICTION]),
+    of(Column, "friction", "N.m", "dry friction of the column", NotNegative(0.1), |_, x, _| x[P::FRICTION]),
     of(Column, "aligning_gain", "N.m.s2/m", "aligning torque per lateral acceleration in a steady turn", Share(0.1), |_, x, _| x[P::ALIGNING].exp()),
     of(Column, "k_aln", "N.m/rad", "aligning torque per side-slip angle of the front wheels, K_aln of equation (4)", Share(0.2), |k, x, _| Physical::of(k, x).aligning_stiffness()),
     of(Column, "torque_offset", "N.m", "what the torque sensors show where no torque acts", Plain(0.1), |_, x, _| -x[P::TORQUE_OFFSET]),
@@ -175,19 +177,24 @@ pub(super) struct Errors {
     beforehand: f64,
     width: Width,
     unit: &'static str,
-    /// The least value that the quantity can have.
-    least: f64,
 }
 
 impl Errors {
     /// The interval that reaches so many standard deviations of a normal distribution.
     fn interval(&self, deviations: f64) -> [f64; 2] {
         let half = deviations * self.error;
-        let ends = match self.width {
+        match self.width {
             Share(_) => [self.value * (-half).exp(), self.value * half.exp()],
-            Plain(_) => [self.value - half, self.value + half],
-        };
-        ends.map(|end| end.max(self.least))
+            Plain(_) | NotNegative(_) => [self.value - half, self.value + half].map(|end| self.allowed(end)),
+        }
+    }
+
+    /// A value, or zero where the quantity cannot be below it.
+    fn allowed(&self, value: f64) -> f64 {
+        match self.width {
+            NotNegative(_) => value.max(0.0),
+            Share(_) | Plain(_) => value,
+        }
     }
 
     /// Half of that interval, as a share or in the unit.
@@ -195,7 +202,7 @@ impl Errors {
         let half = deviations * self.error;
         match self.width {
             Share(_) => half.exp_m1(),
-            Plain(_) => half,
+            Plain(_) | NotNegative(_) => half,
         }
     }
 
@@ -208,7 +215,7 @@ impl Errors {
     fn shown(&self, half: f64) -> String {
         match self.width {
             Share(_) => format!("+-{:.0} %", 100.0 * half),
-            Plain(_) => format!("+-{half:.2e} {}", self.unit),
+            Plain(_) | NotNegative(_) => format!("+-{half:.2e} {}", self.unit),
         }
     }
 }
@@ -234,7 +241,7 @@ impl Definition {
     fn on_scale(&self, value: f64) -> f64 {
         match self.width {
             Share(_) => value.ln(),
-            Plain(_) => value,
+            Plain(_) | NotNegative(_) => value,
         }
     }
 
@@ -261,17 +268,12 @@ impl Definition {
             beforehand: prior.sqrt(),
             width: self.width,
             unit: self.unit,
-            least: if self.name == "friction" {
-                0.0
-            } else {
-                f64::NEG_INFINITY
-            },
         }
     }
 
     fn limit(&self) -> f64 {
         match self.width {
-            Share(limit) | Plain(limit) => limit,
+            Share(limit) | Plain(limit) | NotNegative(limit) => limit,
         }
     }
 
@@ -304,7 +306,7 @@ impl Definition {
     pub(super) fn quantity(&self, known: &Known, found: &Errors, refuted: Option<&str>) -> Quantity {
         let error = match self.width {
             Share(_) => found.value * found.error,
-            Plain(_) => found.error,
+            Plain(_) | NotNegative(_) => found.error,
         };
         let given = self.is_given(known);
         let errors = Some(*found).filter(|_| refuted.is_none() && !given);
@@ -318,7 +320,7 @@ impl Definition {
                 (_, None) => Verdict::Identified,
                 _ => Verdict::NotIdentified,
             },
-            estimate: why.is_none().then_some(found.value.max(found.least)),
+            estimate: why.is_none().then_some(found.allowed(found.value)),
             standard_error: errors.map(|_| error),
             interval_95: errors.map(|errors| errors.interval(QUANTILE_95)),
             errors,

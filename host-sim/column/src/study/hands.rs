@@ -540,9 +540,7 @@ pub fn timer_s(seconds: &[[f64; 2]], threshold_nm: f64, hours: f64, level: Confi
         1.0 + beyond.len() as f64,
     );
     let share = goes_on / (goes_on + ends);
-    // Published times have two decimals of the quantile, and are whole seconds, which may turn by the third.
-    let deviations = if level.is_usual() { 1.96 } else { level.normal() };
-    let half = deviations * (share * (1.0 - share) / (goes_on + ends)).sqrt();
+    let half = level.normal() * (share * (1.0 - share) / (goes_on + ends)).sqrt();
     let starts_in_100_h = FALSE_IN_H * ends / hours;
     [share, share - half, share + half].map(|share| {
         // A share of 1 never ends, one of 0 at once.
